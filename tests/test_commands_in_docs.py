@@ -177,6 +177,7 @@ RUN = [
 def put_log(path: Path, names: list[str], separator: str, *, samples: int = 6000) -> None:
     rng = np.random.default_rng(1)
     gyro, accel = rng.normal(0.0, 8e-4, samples), rng.normal(9.81, 1e-2, samples)
+    gyro *= 57.3 if "deg/s" in " ".join(names) else 1.0
     columns = [np.arange(samples) / 100.0, gyro, accel][-len(names) :]
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savetxt(

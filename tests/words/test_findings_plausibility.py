@@ -38,7 +38,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     ),
     (
         SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL),
-        ["noise is 0.241 °/s/√Hz; expected 0.0005 to 0.06 for any gyro", "it is 0.0042 °/s/√Hz"],
+        ["noise is 0.241 °/s/√Hz; expected 0.0005 to 0.06 for a MEMS gyro", "it is 0.0042 °/s/√Hz"],
     ),
     (
         SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL, printed=True),

@@ -31,7 +31,7 @@ _MAX_FACTOR_BELOW_PRINTED = 2.5
 low-pass filter."""
 
 _USUAL_GYRO_DENSITY = (math.radians(5e-4), math.radians(0.06))
-"""rad/s/√Hz: wider than the range of the shipped sensor files, 0.0015 to 0.035 °/s/√Hz."""
+"""rad/s/√Hz: wider than the range of the MEMS sensors of the catalogue, 0.0015 to 0.035 °/s/√Hz."""
 
 _MAX_OFFSET = math.radians(30.0)
 _MIN_OFFSET_LIMIT = math.radians(2.0)

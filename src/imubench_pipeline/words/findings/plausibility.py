@@ -110,7 +110,9 @@ class SuspiciousUnit(
             if self.mean is not None:
                 seen += f", and the mean rate {base.value_text(self.mean, channel)}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
-            usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
+            usual = (
+                f"expected {limits} {'by its data sheet' if self.printed else 'for a MEMS gyro'}"
+            )
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
         return (
             f"The unit of {name} is probably wrong: {seen}; {usual}. If the log is in "
