@@ -33,6 +33,7 @@ LOG = "Time (s),Gyroscope X (deg/s)\n" + "".join(
 
 OUTPUTS = {
     ("analyse", "output"): ["run.csv", "--output", "{}"],
+    ("calibrate", "output"): ["run.csv", "--target", "json", "--output", "{}"],
     ("init", "folder"): ["{}"],
     ("schema", "output"): ["sensor", "--output", "{}"],
     ("inspect", "output"): ["run.csv", "--output", "{}"],
@@ -48,10 +49,11 @@ OUTPUTS = {
 
 INPUTS = {
     "analyse": {"logs", "sensor", "config"},
+    "calibrate": {"logs", "sensor", "config", "in_use"},
     "run": {"folder"},
     "check": {"logs", "sensors", "config"},
     "inspect": {"log"},
-    "export": {"results"},
+    "export": {"results", "in_use"},
     "show": {"results"},
     "papers": {"results"},
     "shortlist": {"sensors", "requirements", "results"},

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from imubench_pipeline.recordings.drop_zone import get_recording_name
 from imubench_pipeline.run import export_command as exports
 from imubench_pipeline.run.analysis import command as analysis
+from imubench_pipeline.run.project import find_protected_places
 from imubench_pipeline.settings import command_line
 from imubench_pipeline.tables import outputs
 
@@ -57,9 +58,10 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
         exports.check_options(options)
     except ExportError as error:
         raise command_line.CommandError(str(error)) from None
-    output: outputs.OutputFile = options.output or outputs.OutputFile(
-        Path(TARGETS[options.target].file_name), force=options.force
-    )
+    if options.output is None:
+        options.output = outputs.OutputFile(Path(TARGETS[options.target].file_name))
+        outputs.check_outputs(options, find_protected_places)
+    output: outputs.OutputFile = options.output
     status = 0
     for topics, path in _list_files(options, output.path):
         own = output.beside(path)
