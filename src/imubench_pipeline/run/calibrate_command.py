@@ -188,10 +188,12 @@ def _list_not_used(options: argparse.Namespace) -> Iterator[str]:
         return
     try:
         left = inspect_log(options.logs[0], options.topic).draft.left_over
-        imus = [] if options.topic else left
     except ConfigError:
         return
-    for line in left[:_MAX_NOT_USED]:
+    named = [line for line in left if line.startswith("not ")]
+    for line in named[:_MAX_NOT_USED]:
         yield from wrap(line[0].upper() + line[1:], _MAX_WIDTH, max_lines=1, placeholder=" ...")
-    if any("another gyro" in line for line in imus):
+    if len(named) > _MAX_NOT_USED:
+        yield f"{len(named) - _MAX_NOT_USED} more: imubench inspect {options.logs[0]}"
+    if not options.topic and any("another gyro" in line for line in named):
         yield "A further IMU: --topic NAME, or --all for a file of each"
