@@ -259,7 +259,7 @@ def test_a_walk_that_cannot_follow_is_refused(tables: dict[str, pa.Table]) -> No
     settings = ExportSettings(targets=("kalibr",), mode="bounded", horizon="150 s", most_excess=1.2)
     ((place, content),) = make_exports(tables, settings)
     assert str(place) == "mti_7/not_made.txt"
-    assert "at most 1.2 times is allowed; N+GM is held by gnss" in str(content)
+    assert "At most 1.2 times is allowed; N+GM is supported by kf-gins" in str(content)
     assert "take a horizon shorter than 150 s" in str(content)
 
 
@@ -269,7 +269,7 @@ def test_a_walk_that_cannot_follow_is_warned_of(tables: dict[str, pa.Table]) -> 
     assert isinstance(text, str)
     joined = text.replace("\n#  ", "")
     assert "WARNING: the Allan deviation of the smallest N+K is" in joined
-    assert "N+GM is held by gnss-ins-sim; N+GM+K is held by matlab, json, npz, python" in joined
+    assert "gnss-ins-sim; N+GM+K is supported by matlab, json, npz, python" in joined
 
 
 def test_gravity_and_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
