@@ -93,7 +93,7 @@ PACKED = {
     ),
     "20 GB of zeros": Attack(
         file("log.csv.gz", lambda: gzip.compress(bytes(16 * MIB), 1) * 1280),
-        "the file is empty, or cut short in its first line",
+        "the file has zero bytes and no text",
     ),
     "6 GB of comments": Attack(
         file("log.csv.gz", lambda: gzip.compress((b"#" + b"x" * MIB + b"\n") * 16, 1) * 400),
@@ -105,7 +105,7 @@ PACKED = {
     ),
     "a directory just small enough": Attack(
         file("log.zip", lambda: directory_of((1 << 21) // 54)),
-        "expected one file, the folder has",
+        "expected one file, the archive has",
         "holds no column of figures",
     ),
     "100000 members and no directory": Attack(
