@@ -13,17 +13,17 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 from collections.abc import Generator, Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
-from imubench_pipeline.estimators import posterior
-from imubench_pipeline.run.step_server import compile_once
-from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from tests.scheduling import ByUnit, place
+
+if TYPE_CHECKING:  # the workers import them, and the process that waits for them does not
+    from imubench_pipeline.settings.sensor import Sensor
 
 # The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
 settings.register_profile("all", deadline=None, database=None)
@@ -45,12 +45,19 @@ def pytest_configure(config: pytest.Config) -> None:
     On a fresh checkout the first who imports a module of tests rewrites it and keeps that, for a
     minute in all: so they share it.
     """
+    own = getattr(config, "workerinput", None)
+    if own is None and config.option.dist != "no":
+        return  # it only waits for the workers: imports would delay their start
     if "not release" in config.option.markexpr:
+        from imubench_pipeline.estimators import posterior
+
         # To draw takes two thirds of the time of an estimate.
         posterior.sample.__defaults__ = (DAILY_DRAWS,)
-    own = getattr(config, "workerinput", None)
+    read_catalogue_once()
     if own is None:
         return
+    from imubench_pipeline.run.step_server import compile_once
+
     compile_once(_locks(own).open("a+b"))
     if [Path(argument).name for argument in config.args] != ["tests"]:
         return
@@ -58,6 +65,28 @@ def pytest_configure(config: pytest.Config) -> None:
              if (path / "__init__.py").is_file() or path.match("test_*.py")]  # fmt: skip
     first = int(own["workerid"].removeprefix("gw")) * len(parts) // own["workercount"]
     config.args = parts[first:] + parts[:first]
+
+
+def read_catalogue_once() -> None:
+    """Let a process parse each settings file of the project, and its copies, once.
+
+    Most commands read the 35 sensors of the catalogue, for a third of a second.
+    """
+    from imubench_pipeline.settings import yaml_files
+
+    read = yaml_files.read_settings
+    shipped = {path.read_bytes() for path in (PROJECT / "config").rglob("*.yaml")}
+    known: dict[tuple[type[Any], bytes], Any] = {}
+
+    def read_or_recall(model: type[Any], path: Path) -> Any:
+        data = path.read_bytes() if path.is_file() and os.access(path, os.R_OK) else b""
+        if data not in shipped:
+            return read(model, path)
+        if (model, data) not in known:
+            known[model, data] = read(model, path)
+        return known[model, data]
+
+    yaml_files.read_settings = read_or_recall
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -103,6 +132,8 @@ def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
 @cache
 def catalogue() -> dict[str, Sensor]:
     """Return the sensors that come with the project: 35 files, which are read once a worker."""
+    from imubench_pipeline.settings.sensor import read_sensors
+
     return read_sensors(PROJECT / "config/sensors")
 
 

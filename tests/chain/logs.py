@@ -59,10 +59,13 @@ class Table:
     def write(self, path: Path) -> None:
         times = {} if self.times is None else {"time": self.times}
         columns = {**times, **self.columns}
-        lines = [",".join(columns)]
-        for row in zip(*columns.values(), strict=True):
-            lines.append(",".join(self.word if np.isnan(cell) else f"{cell:.9g}" for cell in row))
-        path.write_text("\n".join(lines) + "\n")
+        cells = []
+        for column in columns.values():
+            cells.append([f"{cell:.9g}" for cell in column.tolist()])
+            for row in np.flatnonzero(np.isnan(column)).tolist():
+                cells[-1][row] = self.word
+        rows = map(",".join, zip(*cells, strict=True))
+        path.write_text("\n".join([",".join(columns), *rows]) + "\n")
 
 
 def noise(name: str, rows: int, seed: int) -> Array:

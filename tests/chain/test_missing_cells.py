@@ -44,7 +44,7 @@ def hold(table: Table, *methods: str) -> None:
             assert set(imu.allan_variance(log)) == estimated
 
 
-@settings(suppress_health_check=list(HealthCheck), max_examples=4)
+@settings(suppress_health_check=list(HealthCheck), max_examples=2)
 @given(tables(most=150))
 def test_no_step_fails_for_missing_cells(table: Table) -> None:
     hold(table, "likelihood")

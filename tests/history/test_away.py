@@ -17,7 +17,7 @@ from tests.workflow.project import put_log
 Outcome = dict[str, Any]
 
 MAX_ACCESSES = 400
-EVERY = pytest.mark.parametrize("step", few([11], [1]))
+EVERY = pytest.mark.parametrize("step", few([23], [1]))
 """The accesses before which something is done: each before a release."""
 
 

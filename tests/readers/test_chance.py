@@ -17,11 +17,15 @@ from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.readers.other_formats import OTHER_FORMATS, find_other_format
 from imubench_pipeline.settings.sensor import Reader
+from tests.conftest import few
 from tests.corpus import ENTRIES
 from tests.readers.test_formats import SAMPLES
 from tests.readers.text_logs import PLACED, columns, log_format, written
 
-LENGTHS = [*range(3, 40), 64, 100, 257, 512, 1000, 4096, 20_000, 70_000]
+LENGTHS = few(
+    [3, 4, 8, 16, 32, 257, 512, 4096, 70_000],
+    [*({*range(5, 40)} - {8, 16, 32}), 64, 100, 1000, 20_000],
+)
 
 
 @pytest.mark.parametrize("length", LENGTHS)

@@ -122,7 +122,7 @@ def compare(name: str, changed: Sensor) -> None:
         assert ranks[0] >= ranks[1], where
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.sampled_from(CELLS))
 def test_a_deleted_figure_never_helps(place: tuple[str, tuple[str, ...]]) -> None:
     name, cell = place
@@ -136,7 +136,7 @@ def test_no_deleted_figure_of_the_catalogue_helps(name: str) -> None:
         compare(name, change(SENSORS[name], cell, None))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from([(name, cell) for name, cell in CELLS if cell[0] == "datasheet"]),
     st.floats(1.0, 100.0),

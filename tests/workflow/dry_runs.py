@@ -1,4 +1,4 @@
-"""Dry runs of Snakemake, each in a fork of one process that has what all of them need."""
+"""Runs of Snakemake without steps, each in a fork of one process that has the imports."""
 
 from __future__ import annotations
 
@@ -21,9 +21,14 @@ from tests.conftest import PROJECT
 
 def dry_run(place: Path, arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run ``snakemake -n`` in a folder, as a process of its own would."""
+    return run_snakemake(place, ["-n", *arguments])
+
+
+def run_snakemake(place: Path, arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run Snakemake in a folder, as a process of its own would."""
     process = _server()
     assert process.stdin and process.stdout
-    asked = {"place": str(place), "arguments": ["-n", *arguments]}
+    asked = {"place": str(place), "arguments": list(arguments)}
     process.stdin.write(json.dumps(asked) + "\n")
     process.stdin.flush()
     return subprocess.CompletedProcess(["snakemake"], **json.loads(process.stdout.readline()))

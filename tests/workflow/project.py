@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import re
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import yaml
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.run.lock import INHERITED, Lock
 from tests.conftest import PROJECT
 from tests.workflow.dry_runs import dry_run
 
@@ -90,13 +92,18 @@ class Project:
         return [f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
                 f"results={self.results}", "simulated=false", *FEW, *self.settings]  # fmt: skip
 
-    def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, *flags: str, cores: int = 2, lock: Lock | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake, which inherits a lock on the results if one is given."""
         if flags == ("-n",) and self.environment is None:
             return dry_run(self.place, [f"-c{cores}", "--config", *self.config()])
+        environment = os.environ if self.environment is None else self.environment
         return subprocess.run(
             self.command(*flags, cores=cores),
             cwd=self.place,
-            env=self.environment,
+            env=environment | ({INHERITED: str(lock.descriptor)} if lock else {}),
+            pass_fds=(lock.descriptor,) if lock else (),
             capture_output=True,
             text=True,
             check=False,

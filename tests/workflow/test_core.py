@@ -33,7 +33,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of a checkout without extensions."""
     place = tmp_path_factory.mktemp("core")
     package = Path("src/imubench_pipeline")
-    ignored = shutil.ignore_patterns("__pycache__", "extensions")
+    ignored = shutil.ignore_patterns("extensions")
     shutil.copytree(PROJECT / package, place / package, ignore=ignored)
     for name in ("Snakefile", "workflow", "profiles", "config"):
         (place / name).symlink_to(PROJECT / name)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import imubench_pipeline
+from imubench_pipeline.run.lock import Lock, locate_lock
 from tests.conftest import PROJECT
 from tests.workflow.project import BAD, Project, linked, put_bad_logs, put_log, put_sensor
 
@@ -101,9 +102,12 @@ NO_REST = "the step outlook failed: ZeroDivisionError: no rest"
 
 @pytest.fixture(scope="module")
 def run(project: Project, faulty: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    """The run in which steps fail."""
+    """The run in which steps fail, of a process that works on the results as its parent does."""
     project.environment = faulty
-    return project.run("report", "tables")  # without printed figures, which take a third of it
+    with Lock(locate_lock(project.results)) as lock:
+        lock.acquire()
+        # Without printed figures, which take a third of it.
+        return project.run("report", "tables", lock=lock)
 
 
 def test_the_report_says_which_recordings_a_step_failed_for(
