@@ -52,7 +52,7 @@ def test_what_a_log_does_not_say_is_asked_for(tmp_path: Path) -> None:
     put_log(tmp_path / "a.csv", 1, samples=100)
     with pytest.raises(UnfilledError) as raised:
         laid_out(tmp_path, tmp_path / "a.csv", accel_unit="m/s^2")
-    assert "a.csv: the log does not say: rate, gyro unit\n" in str(raised.value)
+    assert "a.csv: the log does not state: rate, gyro unit\n" in str(raised.value)
     assert "--rate '100 Hz'" in str(raised.value)
     assert "--accel-unit" not in str(raised.value)
 

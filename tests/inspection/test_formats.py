@@ -205,7 +205,7 @@ def test_what_ros_calls_linear_acceleration_is_measured(tmp_path: Path) -> None:
     path = test_rosbag.bag(tmp_path, "ros1", {"/imu": test_rosbag.imu_topic("ros1", rows)})
     found = inspect(path)
     assert set(found.draft.channels) == set(CHANNELS)
-    assert "m/s^2 long, which is not gravity" in found.block
+    assert "m/s^2, which is not gravity" in found.block
     assert "gravity is 9.81: is the unit right?" in found.proof.said
 
 

@@ -96,7 +96,7 @@ def test_gravity_tells_the_unit_of_the_accelerometer(
     names = ["t", "gx (rad/s)", "gy (rad/s)", "gz (rad/s)", "ax", "ay", "az"]
     path = saved(tmp_path, logged(si, names, {"accel": scale}))
     found = drafted(path, dict(list(si.items())[:7]))
-    assert f"unit: {unit}}}  # guessed: the mean is" in found.block
+    assert f"unit: {unit}}}  # guessed: the length of the mean is" in found.block
 
 
 def test_counts_are_not_taken_for_a_unit(tmp_path: Path, si: Columns) -> None:

@@ -178,6 +178,7 @@ EXPORTS = [
     of(exports.status_reason, "not determined (why)", "the sensitivity", "not_identified", "why"),
     of(exports.effect_not_shown, "does not show an effect", None),
     of(exports.value_kind, "upper limit of K", "N+K", "N+K", True),
+    of(exports.value_kind, "from the upper limit of K", "N+K", "N+GM", True),
     of(exports.value_kind, "slow terms of N+F+K together", "N+F+K", "N+K", False),
     of(exports.limit_of_walk, "Allan variance at 60 s", 1e-6, 60.0),
     of(

@@ -22,9 +22,9 @@ from imubench_pipeline.export.px4 import clip_values
 ARDUPILOT = programs.declare(
     "ArduPilot (EKF3)",
     "https://github.com/ArduPilot/ardupilot/blob/HEAD/libraries/AP_NavEKF3/AP_NavEKF3_core.cpp",
-    "Noise a step of the filter of about 12 ms: N / sqrt(dt) and K / sqrt(dt), dt = 12 ms; N and K "
-    "are two-sided densities, SI. They are what the sensor alone makes, at rest: vibration in "
-    "flight adds to it, and the defaults of ArduPilot allow for that.",
+    "Noise per step of the filter of about 12 ms: N / sqrt(dt) and K / sqrt(dt), dt = 12 ms; N "
+    "and K are two-sided densities, SI. Vibration in flight adds to the noise at rest, and the "
+    "defaults of ArduPilot allow for it.",
     (programs.FILTER_SAMPLE, "EK3_GYRO_P_NSE", "EK3_ACC_P_NSE"),
     (programs.FILTER_STEP, "EK3_GBIAS_P_NSE", "EK3_ABIAS_P_NSE"),
 )

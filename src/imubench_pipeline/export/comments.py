@@ -27,7 +27,7 @@ def describe_model(
     replacements of the models; `temperature`: the file contains the effect on the biases; `each`:
     it contains a number of each axis.
     """
-    statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
+    statements = [f"Noise of {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
         statements.append("The recordings are SIMULATED, not measured.")
     if imu.mode:

@@ -13,7 +13,7 @@ _HUB = "https://github.com/"
 KF_GINS = programs.declare(
     "KF-GINS",
     _HUB + "i2Nav-WHU/KF-GINS/blob/HEAD/src/kf-gins/gi_engine.cpp",
-    "arw and vrw are N (two-sided) an hour; gbstd and abstd are the standard deviation of a "
+    "arw and vrw are N (two-sided) per root hour; gbstd and abstd are the standard deviation of a "
     "first-order Gauss-Markov process (1.076 B), and corrtime its T_B, one for gyro and "
     "accelerometer. The lines replace the lines of the same name in the configuration.",
     (programs.WHITE, "arw", "vrw", "deg/sqrt(h)", "m/s/sqrt(h)"),

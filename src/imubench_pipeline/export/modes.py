@@ -138,7 +138,8 @@ def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words:
         notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
         raised = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
         each = {letter: one for letter, one in raised.items() if one is not None}
-        return replace(axis, model=model, notes=notes, each=each)
+        limited = axis.slow_limited and model.K == axis.model.K
+        return replace(axis, model=model, notes=notes, each=each, slow_limited=limited)
 
     gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
     return replace(imu, gyro=gyro, accel=accel, mode=words)

@@ -35,10 +35,9 @@ from imubench_pipeline.export.mapping import Mapped
 PX4 = programs.declare(
     "PX4 (EKF2)",
     "https://github.com/PX4/PX4-Autopilot/blob/HEAD/src/modules/ekf2/EKF/covariance.cpp",
-    "Noise a step of the filter: N / sqrt(dt) and K / sqrt(dt), where dt is EKF2_PREDICT_US; N and "
-    "K are two-sided densities, SI. They hold for the EKF2_PREDICT_US of the file only. They are "
-    "what the sensor alone makes, at rest: vibration in flight adds to it, and the defaults of PX4 "
-    "allow for that.",
+    "Noise per step of the filter: N / sqrt(dt) and K / sqrt(dt), where dt is EKF2_PREDICT_US; N "
+    "and K are two-sided densities, SI. The values are valid for the EKF2_PREDICT_US of the file "
+    "only. Vibration in flight adds to the noise at rest, and the defaults of PX4 allow for it.",
     (programs.FILTER_SAMPLE, "EKF2_GYR_NOISE", "EKF2_ACC_NOISE"),
     (programs.FILTER_STEP, "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),
 )

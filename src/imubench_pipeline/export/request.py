@@ -174,8 +174,8 @@ def _select_deciding(
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]
     if rows and not deciding:
         raise imu.ExportError(
-            f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
-            "same (--because; exports: because; decide: include)"
+            f"{reasons}; see the findings. To use it anyway, state the reason: --because, or "
+            "'exports: because' or 'decide: include' in a project"
         )
     return deciding, [reasons, *without]
 

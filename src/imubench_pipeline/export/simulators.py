@@ -18,7 +18,7 @@ _MIN_SAMPLES_IN_T_B = 20.0
 GNSS_INS_SIM = programs.declare(
     "gnss-ins-sim",
     "https://github.com/Aceinna/gnss-ins-sim/blob/HEAD/gnss_ins_sim/pathgen/pathgen.py",
-    "*_arw and *_vrw are N (two-sided) an hour; *_b_stability is the standard deviation of a "
+    "*_arw and *_vrw are N (two-sided) per root hour; *_b_stability is the standard deviation of a "
     "first-order Gauss-Markov process (1.076 B), *_b_corr its T_B in s. Fixed biases are 0.",
     (programs.WHITE, "gyro_arw", "accel_vrw", "deg/sqrt(h)", "m/s/sqrt(h)"),
     (programs.PROCESS, "gyro_b_stability", "accel_b_stability", "deg/h", "m/s^2"),

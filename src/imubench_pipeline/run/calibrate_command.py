@@ -169,9 +169,11 @@ def _describe_logs(tables: "Mapping[str, pa.Table]") -> Iterator[str]:
     for row in rows:
         estimated = [each for each in terminal.select_of(row, parameters) if each.recommended]
         length = terminal.describe_length(row, estimated, terminal.select_of(row, allan))
-        yield from wrap(state_text(row, length), _MAX_WIDTH)
+        found = terminal.select_of(row, findings)
+        moved = any(each.finding in ("motion", "turning") for each in found)
+        yield from wrap(state_text(row, length, moved=moved), _MAX_WIDTH)
         yield from wrap(reason_text(row), _MAX_WIDTH)
-        own = [each for each in terminal.select_of(row, findings) if each.finding not in LEFT_OUT]
+        own = [each for each in found if each.finding not in LEFT_OUT]
         for number, event in enumerate(group_events(own)[:shown], start=1):
             text = f"{number}. {events_text(event.findings, 'practical', event.factors())}"
             yield from wrap(

@@ -124,7 +124,7 @@ def format_draft(draft: Draft, file: str) -> str:
     lines += _format_entries(list(draft.channels.items()), "    ")
     if draft.temperature is not None:
         lines += _format_entries([("temperature", draft.temperature)], "  ")
-    lines += ["datasheet:", "  document: null  # its name; and below, the figures as printed"]
+    lines += ["datasheet:", "  document: null  # its name; enter the printed figures below"]
     lines += ["  gyro: {}", "  accel: {}"]
     lines += [f"# {make_printable(text)}" for text in draft.left_over[:_MAX_REMARKS]]
     if len(draft.left_over) > _MAX_REMARKS:

@@ -482,7 +482,7 @@ def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
     elif group.rank == WITHOUT_GRAVITY:
         comment = "with gravity, by its mean: so this is what the accelerometer measures"
     elif group.quantity == "accel" and group.mean_length is not None and not group.gravity_unit:
-        comment = f"the mean is {group.mean_length:.4g} {unit} long, which is not gravity"
+        comment = f"the length of the mean is {group.mean_length:.4g} {unit}, which is not gravity"
     if group.hint and (group.quantity == "gyro" or next(iter(group.columns.values())).hint):
         comment = ""  # the hint says more
     comment = "; ".join(text for text in (group.guessed, group.hint, comment) if text)
@@ -497,13 +497,13 @@ def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
     if length is None:
         return UNKNOWN, "not stated in the file: m/s^2, g or mg?"
     if unit is not None:
-        return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
+        return unit, f"guessed: the length of the mean is {length:.4g}, as gravity in {unit}"
     counts = [count for count in _COUNTS_PER_G if abs(length / count - 1) < _COUNT_TOLERANCE]
     hint = (
         f": counts of g/{counts[0]}? then 'unit: g, scale: {1 / counts[0]:.10g}'" if counts else ""
     )
     what = f"the file says {group.written!r}, and" if group.written else "the file does not say;"
-    return UNKNOWN, f"{what} the mean is {length:.4g} long{hint}"
+    return UNKNOWN, f"{what} the length of the mean is {length:.4g}{hint}"
 
 
 def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
@@ -514,7 +514,7 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
     if unit is None and len(present):
         level = float(np.median(present))
         unit = "degC" if -60 <= level <= 130 else "K" if 230 <= level <= 400 else None
-        comment = f"guessed: {level:.4g} is one in {unit}"
+        comment = f"guessed: {level:.4g} is plausible in {unit}"
     if unit is None:
         drafted.left_over.append(
             f"not taken: {_name_group(group)}, a temperature in a unit that the file does not state"

@@ -134,9 +134,9 @@ class _Search:
         if (labels := find_labels(texts)) is None:
             if (sentence := find_sentence(texts)) is not None:
                 raise RecordingError(
-                    f"{self._file}: its lines are words and values for people, such as "
+                    f"{self._file}: its lines are text for reading, such as "
                     f"{sentence.strip()[:60]!r}, as Adafruit's examples and 'rostopic echo' print "
-                    "them; expected a line a record: print CSV in the sketch "
+                    "them; expected one record per line: print CSV in the sketch "
                     "(Serial.print(micros()); Serial.print(','); Serial.print(g.gyro.x, 6); ... "
                     "Serial.println()), or read the bag itself"
                 )
@@ -423,8 +423,8 @@ def refuse_other_formats(file: str, line: bytes) -> None:
         )
     if begin.startswith(_JSON_PREFIXES) or begin in _JSON_BRACKETS:
         raise RecordingError(
-            f"{file}: is JSON, which begins with {shown!r}; expected a line a record: export the "
-            "log as CSV"
+            f"{file}: is JSON, which begins with {shown!r}; expected one record per line: export "
+            "the log as CSV"
         )
 
 

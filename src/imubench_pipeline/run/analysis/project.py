@@ -158,7 +158,7 @@ def draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
             "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
             "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
         }
-        lines = [f"{log}: the log does not say: {', '.join(keys)}"]
+        lines = [f"{log}: the log does not state: {', '.join(keys)}"]
         if all(key in options for key in keys):
             lines += [f"  add {options[key]}" for key in keys]
             lines.append("or write a sensor file once, for all logs of this sensor:")

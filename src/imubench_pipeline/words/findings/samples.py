@@ -255,7 +255,7 @@ class Motion(FindingData, affects=ALL, unfit=True, doubt="the sensor was moved")
     def text(self, channel: str) -> str:
         return (
             f"{channel_name(channel)} shows motion from {at_text(self.start)} to "
-            f"{at_text(self.end)}. Leave it out: 'use:' in the notes beside the log, or "
+            f"{at_text(self.end)}. Leave it out: 'use:' in the notes beside the log, --at-rest, or "
             "quality.at_rest in the settings"
         )
 

@@ -33,7 +33,8 @@ MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
 def value_kind(model: str, written: str, limited: bool) -> str:
     """Return how a slow term was found; models as `NoiseModel.name`, ``limited``: from above."""
     if limited:
-        return "upper limit of K: the log does not show it"
+        source = "" if "K" in written.split("+") else "from the "
+        return f"{source}upper limit of K: the log does not show it"
     terms = [term for term in dict.fromkeys(model.split("+")) if term not in ("Q", "S")]
     if set(terms) == set(written.split("+")):
         return ""
@@ -78,7 +79,7 @@ def floor_in_use(source: str) -> str:
 def raised(before: float, N: float, K: float) -> str:
     """Return how the mode raised the densities, SI."""
     walk = f", K at least {K:.4e}" if K else ""
-    return f"N is {N:.4e} for the use, and {before:.4e} at rest{walk}"
+    return f"N is {N:.4e} in use, and {before:.4e} at rest{walk}"
 
 
 def pooled(channel: str, recordings: Sequence[str]) -> str:
