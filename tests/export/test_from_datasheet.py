@@ -62,7 +62,7 @@ def test_every_program_takes_the_sensors_of_the_catalogue(target: str) -> None:
         (["--datasheet", "bmi088", "--target", "nothing"], "there are: "),
         (["--datasheet", "bmi088", "--target", "kalibr", "--bounded"], "needs a log"),
         (["--target", "kalibr"], "expected the folder of results, or --datasheet"),
-        (["results", "--target", "kalibr"], "no table recordings"),
+        (["no_results", "--target", "kalibr"], "no table recordings"),
         (["results", "--datasheet", "bmi088", "--target", "kalibr"], "expected the folder"),
     ],
 )

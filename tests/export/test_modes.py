@@ -105,6 +105,7 @@ def test_the_noise_of_a_log_in_use_never_lowers_the_noise_at_rest(
     assert raised.accel.model.terms == ACCEL.model.terms
     assert f"lines at 50 Hz ({number(0.2)} °/s rms)" in raised.mode
     assert "Below 10 Hz all is taken as motion" in raised.mode
+    assert ("no more noise than the log at rest" in raised.mode) == (noise < 1e-4)
 
 
 def number(rate: float) -> str:

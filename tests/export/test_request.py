@@ -239,6 +239,15 @@ def test_an_overbound_is_larger_and_says_what_it_is(
     assert "at every tau from 1 to 60 s (95 % for all together)" in joined
 
 
+def test_a_bound_with_one_number_is_above_every_axis(tables: dict[str, pa.Table]) -> None:
+    found = build_imu(tables, replace(REQUEST, target="gtsam", mode="bounded"))
+    for axis in (found.gyro, found.accel):
+        assert axis is not None
+        for own in axis.each.values():
+            assert axis.model.N >= own.model.N
+            assert axis.model.K >= own.model.K
+
+
 @pytest.mark.release
 def test_the_head_of_an_overbound_says_where_its_density_holds(
     tables: dict[str, pa.Table], bounded: str

@@ -124,6 +124,15 @@ def test_models_are_written_without_a_log(tmp_path: Path) -> None:
         imu.export({"gyro_x": GYRO}, "kalibr", rate=200.0)
 
 
+def test_the_file_is_not_where_notes_of_a_log_are(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notes = log.with_suffix(".yaml")
+    assert main(["calibrate", str(log), "--target", "kalibr", "--output", str(notes)]) == 2
+    assert "notes of a log" in capsys.readouterr().err
+    assert not notes.exists()
+
+
 def test_a_moved_log_is_not_written(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -155,7 +155,10 @@ def pool_recordings(
         sinusoids=choice.axis.model.sinusoids,
     )
     origin = f"{choice.axis.origin}. In its place: {texts.pooled(choice.channel, [*models])}"
-    axis = replace(choice.axis, model=pooled, origin=origin)
+    estimated = make_estimate(choice.method, parts[choice.recording])
+    single = parameter_notes(estimated, choice.determined)  # values of one recording
+    notes = [note for note in choice.axis.notes if note not in single]
+    axis = replace(choice.axis, model=pooled, origin=origin, notes=notes)
     return replace(choice, axis=axis, determined=True)
 
 

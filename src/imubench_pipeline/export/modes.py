@@ -80,6 +80,9 @@ hku-mars/FAST_LIO, config/avia.yaml; PX4-Autopilot, src/modules/ekf2 (parameters
 EKF2_GYR_NOISE, EKF2_ACC_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE, at EKF2_PREDICT_US); ArduPilot,
 libraries/AP_NavEKF3/AP_NavEKF3.cpp (GYRO_P_NSE_DEFAULT and so on, the same of all vehicles)."""
 
+_MIN_RATIO_IN_USE = 1.2
+"""Of the noise in use over the noise at rest: below it, the sensor was hardly in use."""
+
 FLIGHT_TARGETS = frozenset({"px4", "px4-mavparm", "ardupilot"})
 """Programs that fly: noise at rest is written for them only if it is asked for."""
 
@@ -110,6 +113,12 @@ def apply_mode(
             for channel, own in measured.items()
         ]
         words = texts.noise_in_use(next(iter(measured.values())).cutoff, each)
+        if all(
+            floors[name][0] < _MIN_RATIO_IN_USE * axis.model.N
+            for name, axis in imu.axes.items()
+            if name in floors
+        ):
+            words = f"{texts.NO_MORE_THAN_AT_REST} {words}"
         return _raise_to(imu, target, floors, 1.0, words)
     if target.name not in FLOORS:
         raise ExportError(

@@ -122,13 +122,19 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
         warmed = _select_rows(TemperatureRow, tables, **place)
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
+        every = (choice, *choice.each.values())
         if mode == "bounded":
-            curve = _find_curve(tables, request.sensor, choice)
-            axes[quantity] = _bound_axis(curve, choice, request, about.rate, folder)
-            continue
-        chosen, *own = (
-            _make_axis(tables, request, rows, one) for one in (choice, *choice.each.values())
-        )
+            curves = (_find_curve(tables, request.sensor, one) for one in every)
+            chosen, *own = (
+                _bound_axis(curve, one, request, about.rate, folder)
+                for curve, one in zip(curves, every, strict=True)
+            )
+            largest = {
+                name: max(getattr(one.model, name) for one in (chosen, *own)) for name in "NK"
+            }  # one number for all axes is above each of them
+            chosen = replace(chosen, model=replace(chosen.model, **largest))
+        else:
+            chosen, *own = (_make_axis(tables, request, rows, one) for one in every)
         axes[quantity] = replace(chosen, each=dict(zip(choice.each, own, strict=True)))
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)

@@ -64,6 +64,10 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
     output: outputs.OutputFile = options.output
     status = 0
     for topics, path in _list_files(options, output.path):
+        if any(path.absolute() == _locate_notes(log) for log in options.logs):
+            raise command_line.CommandError(
+                f"{path}: is where the notes of a log are; name another file with --output"
+            )
         own = output.beside(path)
         own.check()  # before the log is read
         of_imu = argparse.Namespace(**{**vars(options), "topic": list(topics), "output": own})
@@ -86,9 +90,18 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
         raise command_line.CommandError(str(error)) from None
     if not found:
         raise command_line.CommandError(f"{options.logs[0]}: no gyro; expected one for each IMU")
+    used: list[Path] = []
     for topics in found:
         name = re.sub(r"\W+", "_", topics[0]).strip("_")
-        yield topics, path.with_name(f"{path.stem}_{name}{path.suffix}" if name else path.name)
+        place = path.with_name(f"{path.stem}_{name}{path.suffix}" if name else path.name)
+        used.append(place)
+        if (number := used.count(place)) > 1:  # /imu/a and /imu_a
+            place = place.with_stem(f"{place.stem}_{number}")
+        yield topics, place
+
+
+def _locate_notes(log: Path) -> Path:
+    return log.absolute().with_name(f"{get_recording_name(log.name)}.yaml")
 
 
 def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
@@ -106,7 +119,9 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
         try:
             measured = None
             if options.in_use not in (None, exports.NOT_MEASURED):
-                measured = exports.read_in_use(options.in_use, plan.sensors[sensor], options.motion)
+                declared = plan.sensors[sensor] if options.sensor else None
+                stated = analysis.read_stated(options)
+                measured = exports.read_in_use(options.in_use, declared, options.motion, stated)
             sources = sorted(plan.sensors[sensor].log.channels.items(), reverse=True)  # gyro first
             topics = [one.variable for _, one in sources if str(one.variable).startswith("/")]
             request = exports.make_request(
@@ -194,7 +209,8 @@ def _list_not_used(options: argparse.Namespace) -> Iterator[str]:
         return
     named = [line for line in left if line.startswith("not ")]
     for line in named[:_MAX_NOT_USED]:
-        yield from wrap(line[0].upper() + line[1:], _MAX_WIDTH, max_lines=1, placeholder=" ...")
+        short = re.sub(r"(\w+)\.x, \1\.y, \1\.z", r"\1", line)
+        yield from wrap(short[0].upper() + short[1:], _MAX_WIDTH, max_lines=1, placeholder=" ...")
     if len(named) > _MAX_NOT_USED:
         yield f"{len(named) - _MAX_NOT_USED} more: imubench inspect {options.logs[0]}"
     if not options.topic and any("another gyro" in line for line in named):

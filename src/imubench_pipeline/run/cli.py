@@ -319,11 +319,7 @@ COMMANDS = {
         "estimate the noise in logs, and write the file of a filter, such as Kalibr's imu.yaml",
         calibration.add_arguments,
         calibration.run,
-        (
-            "written",
-            "a log may not be used, or the program cannot hold its noise",
-            "a log or the sensor file is missing, or incomplete",
-        ),
+        ("written", "", "a log cannot be used, or is incomplete, or the program cannot hold it"),
     ),
     "init": command_line.Command(
         "make a folder of logs",

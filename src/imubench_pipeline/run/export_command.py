@@ -17,6 +17,7 @@ from imubench_pipeline.tables import outputs
 if TYPE_CHECKING:
     from imubench_pipeline.export.imu import Imu
     from imubench_pipeline.export.in_use import InUseNoise
+    from imubench_pipeline.run.analysis.project import Stated
 
 NOT_MEASURED = Path()  # --in-use without a log
 
@@ -222,16 +223,18 @@ def build_from_datasheet(options: argparse.Namespace) -> "Imu":
     return apply_mode(imu, TARGETS[options.target], mode, measured)
 
 
-def read_in_use(path: Path, sensor: Sensor | None, cutoff: float) -> "Mapping[str, InUseNoise]":
+def read_in_use(
+    path: Path, sensor: Sensor | None, cutoff: float, stated: "Stated | None" = None
+) -> "Mapping[str, InUseNoise]":
     """Return the noise of each channel of a log in use; ``sensor``: its format; None: drafted.
 
-    Raises ExportError if the log cannot be read, or is too short.
+    ``stated`` completes the draft. Raises ExportError if the log cannot be read, or is too short.
     """
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.in_use import measure_in_use
     from imubench_pipeline.recordings.ingest import ingest_as_planned
     from imubench_pipeline.recordings.recording import open_channel_logs, place_on_grid
-    from imubench_pipeline.run.analysis.project import Stated, draft_sensor
+    from imubench_pipeline.run.analysis.project import Stated, UnfilledError, draft_sensor
     from imubench_pipeline.settings.quality import QualitySettings
     from imubench_pipeline.settings.sensor import merged_log
     from imubench_pipeline.settings.validation import parse
@@ -239,7 +242,16 @@ def read_in_use(path: Path, sensor: Sensor | None, cutoff: float) -> "Mapping[st
     if not path.exists():
         raise ExportError(f"{path}: no such file; expected a log in use")
     if sensor is None:
-        sensor = parse(Sensor, draft_sensor(path, Stated()), f"drafted from {path}")
+        try:
+            drafted = draft_sensor(path, Stated())
+        except UnfilledError:
+            if not stated:
+                raise ExportError(
+                    f"{path}: its header does not state units or rate; expected columns such as "
+                    "gyro_x [deg/s], or a log of the sensor file of the run"
+                ) from None
+            drafted = draft_sensor(path, stated)
+        sensor = parse(Sensor, drafted, f"drafted from {path}")
     notes = RecordingNotes()
     plan = IngestPlan(
         kind="in_use",  # knocks are vibration, and stay
@@ -251,7 +263,7 @@ def read_in_use(path: Path, sensor: Sensor | None, cutoff: float) -> "Mapping[st
         kept = Path(folder)
         found = ingest_as_planned(path, plan.model_dump_json(), "in_use", path.stem, kept)
         if found.recording.status != "ok":
-            raise ExportError(f"{path}: {found.recording.reason}")
+            raise ExportError(str(found.recording.reason))
         try:
             return {
                 channel: measure_in_use(place_on_grid(log.blocks(), log.grid), log.rate, cutoff)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from imubench_pipeline.run.analysis.compilation import Compilation
+    from imubench_pipeline.run.analysis.project import Stated
     from imubench_pipeline.run.plan import Plan
 
 _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and bytes
@@ -137,16 +138,14 @@ def plan_logs(arguments: argparse.Namespace, folder: Path, device: str | None = 
     ``device``: the name of the sensor of all logs; None: a sensor for each log. Raises CommandError
     if a log or a setting cannot be used.
     """
-    from imubench_pipeline.run.analysis.project import Stated, lay_out
+    from imubench_pipeline.run.analysis.project import lay_out
     from imubench_pipeline.run.plan import Plan
     from imubench_pipeline.settings.config import Run, read_config
     from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.validation import ConfigError
 
     try:
-        stated = Stated(
-            arguments.rate, arguments.gyro_unit, arguments.accel_unit, tuple(arguments.topic)
-        )
+        stated = read_stated(arguments)
         catalogue = list_folders(Run().sensors, "sensors")
         paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, folder, device)
         config = {**read_config(arguments.config), **paths}
@@ -157,6 +156,14 @@ def plan_logs(arguments: argparse.Namespace, folder: Path, device: str | None = 
         return Plan(config)
     except ConfigError as error:
         raise command_line.CommandError(f"imubench {arguments.command}: {error}") from None
+
+
+def read_stated(arguments: argparse.Namespace) -> "Stated":
+    """Return what the arguments state of logs."""
+    from imubench_pipeline.run.analysis.project import Stated
+
+    units = arguments.gyro_unit, arguments.accel_unit
+    return Stated(arguments.rate, *units, tuple(arguments.topic))
 
 
 def say(text: str) -> None:

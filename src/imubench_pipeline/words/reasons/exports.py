@@ -19,6 +19,9 @@ _OTHER_AXES: Mapping[OtherAxes, str] = {
 }
 
 
+NO_MORE_THAN_AT_REST = (
+    "CAUTION: the log in use has no more noise than the log at rest: were the motors on?"
+)
 NO_TEMPERATURE_FIT = "no fit of the temperature"
 BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
 
