@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import TYPE_CHECKING, Any, get_args
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import count_threads
-from imubench_pipeline.datasheets.suspicion import usual_figures
+from imubench_pipeline.datasheets.suspicion import UsualFigures, usual_figures
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
@@ -354,10 +355,15 @@ def estimate(
         into.estimate_findings,
         recommended,
         {} if log.declared is None else {log.sensor: log.declared},
-        usual_figures(shipped_sensors()),
+        _usual_of_catalogue(),
     )
     doubted = list(derive_doubts(rows, recommended, into.models))
     return Estimates(estimates, log, method, list(map(make_finding, rows)), doubted, left_out, into)
+
+
+@cache
+def _usual_of_catalogue() -> UsualFigures:
+    return usual_figures(shipped_sensors())
 
 
 def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:

@@ -147,10 +147,8 @@ class _Covariance:
     def sums(self, terms: int) -> tuple[float, float]:
         """Return the sums of r_k^2 and r_k over all pairs of consecutive differences."""
         n = self._n
-        steps = np.arange(_MAX_LAG_CLUSTERS * _LAGS_PER_CLUSTER + 1)
-        lags = np.arange(_MAX_LAG_CLUSTERS * n + 1)
-        if n > _LAGS_PER_CLUSTER:
-            lags = np.unique(steps * n // _LAGS_PER_CLUSTER)
+        parts = min(n, _LAGS_PER_CLUSTER)
+        lags = np.arange(_MAX_LAG_CLUSTERS * parts + 1) * n // parts
         longest = terms - 1
         lags = np.append(lags[lags < longest], longest) if lags[-1] > longest else lags
         smooth, rounding = self._at(lags)
