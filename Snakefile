@@ -12,7 +12,7 @@ for file in files_of("rules"):  # of extensions
 
 
 include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortlist, fusion
-include: "workflow/rules/report.smk"  # what is read: pages, figures, exports
+include: "workflow/rules/report.smk"  # what is read: pages and figures
 
 
 # What is missing or not as it was left is asked for by name: Snakemake takes away what a failed step
@@ -21,7 +21,7 @@ rule all:
     input:
         rules.report.output,
         rules.figures.output,
-        rules.exports.output,
+        ADDED_OUTPUTS,
         made_again,
     localrule: True
 

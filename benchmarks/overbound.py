@@ -32,8 +32,8 @@ from scipy.linalg import block_diag
 from bands import highest, what_is_cut
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.export.growth import growth
-from imubench_pipeline.export.overbound import Family, overbound, simultaneous_upper
+from imubench_pipeline.extensions.exports.growth import growth
+from imubench_pipeline.extensions.exports.overbound import Family, overbound, simultaneous_upper
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate

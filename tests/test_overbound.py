@@ -8,8 +8,8 @@ from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
-from imubench_pipeline.export.growth import growth
-from imubench_pipeline.export.overbound import (
+from imubench_pipeline.extensions.exports.growth import growth
+from imubench_pipeline.extensions.exports.overbound import (
     FAMILIES,
     Family,
     Overbound,

@@ -25,6 +25,8 @@ HOOKS: dict[str, type | None] = {  # None: a function
     "limits": None,
     "sensor_tables": None,
     "commands": Command,
+    "library": None,
+    "listings": None,
     "pages": Entry,
     "recording_pages": RecordingPage,
     "sections": Section,

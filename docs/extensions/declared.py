@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from extensions.markdown import cell, code, table
-from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.extensions.exports.targets import TARGETS, list_targets
 from imubench_pipeline.model.table import TypedColumn
 from imubench_pipeline.noise.terms import TERMS
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.report.glossary import Term, read_glossary
-from imubench_pipeline.run.formats_command import Line, list_export_targets, list_log_formats
+from imubench_pipeline.run.formats_command import Line, list_log_formats
 from imubench_pipeline.tables.schemas import TABLES
 from imubench_pipeline.words.verdicts import VERDICT_MEANINGS, VERDICT_WORDS
 
@@ -93,12 +93,12 @@ def terms_of_the_report() -> str:
 
 def formats() -> str:
     """Return the logs that are read."""
-    return _of_lines(list_log_formats())
+    return _of_lines(list_log_formats()[1])
 
 
 def targets() -> str:
     """Return the programs that files are written for."""
-    return _of_lines(list_export_targets())
+    return _of_lines(list_targets()[1])
 
 
 def which_numbers() -> str:

@@ -51,10 +51,10 @@ From the lowest: `units`, `earth` and `typing`; `model` (the rows of every table
 users declare), `allan` (the Allan
 variance), `tables` (columns, reading, writing), `noise` (what each noise is), `readers` (log
 files), `recordings` (logs, judged and kept), `estimators` (parameters), `datasheets`, `simulate` (a
-whole sensor), `navigation` (what noise means in use), `experiments` (known rates), `export`,
-`report`, `steps` (one module a rule of the workflow), `library` (the front door) and `run` (plan,
-processes, commands). Only `report`, `steps` and `run` know the files and the settings of a run
-together. ``docs/architecture.md`` lists the permitted imports.
+whole sensor), `navigation` (what noise means in use), `report`, `steps` (one module a rule of the
+workflow), `library` (the front door), `run` (plan, processes, commands) and `extensions`, such as
+`extensions.exports` (files for filters). Only `report`, `steps` and `run` know the
+files and the settings of a run together. ``docs/architecture.md`` lists the permitted imports.
 
 References
 ----------
@@ -68,7 +68,7 @@ References
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from imubench_pipeline.export.of_models import export
+    from imubench_pipeline.extensions.exports.of_models import export
     from imubench_pipeline.library.comparison import compare
     from imubench_pipeline.library.curves import allan_variance
     from imubench_pipeline.library.estimates import estimate
@@ -107,8 +107,10 @@ def __getattr__(name: str) -> Any:
 
     if name == "__version__":
         return metadata.version(__name__)
-    if name in ("export", "simulate"):
+    if name == "simulate":
         return import_module(f"{__name__}.{name}")  # the package, which is called
+    if name == "export":
+        return import_module(f"{__name__}.registry").find_function(name)
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)

@@ -49,6 +49,8 @@ class Extension:
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
     sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
+    library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
+    listings: tuple[str, ...] = ()  # further tables of `imubench formats`
     pages: tuple[str, ...] = ()  # that a report has once
     recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording
     sections: tuple[str, ...] = ()  # of pages that a report has once
@@ -123,6 +125,14 @@ def load(reference: str) -> Any:
     module, _, name = reference.partition(":")
     loaded = import_module(f"{__package__}.extensions.{module}")
     return getattr(loaded, name) if name else loaded
+
+
+def find_function(name: str) -> Any:
+    """Return the function of the library that an extension adds; ImportError without it."""
+    added = references("library")
+    if name not in added:
+        raise ImportError(f"{__package__}: no extension has {name}; expected all of extensions/")
+    return load(added[name])
 
 
 def sources(of: str, name: str) -> list[Path]:

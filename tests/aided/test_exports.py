@@ -10,9 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.export.imu import AxisNoise, Imu
-from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
-from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.extensions.aided.axis_states import (
     AxisStates,
     add_turn_on_bias,
@@ -24,6 +21,9 @@ from imubench_pipeline.extensions.aided.trajectories import (
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.exports.imu import AxisNoise, Imu
+from imubench_pipeline.extensions.exports.matrices import FLICKER_TAU_OVER_HORIZON
+from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.settings.sensor import CHANNELS

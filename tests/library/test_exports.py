@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 import imubench_pipeline as imu
-from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.extensions.exports.command import read_in_use
+from imubench_pipeline.extensions.exports.imu import ExportError
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.run.export_command import read_in_use
 
 RATE = 20.0
 GYRO = imu.NoiseModel(N=2e-4, B=3e-5, K=2e-6)

@@ -198,7 +198,7 @@ def test_an_edit_of_a_reader_runs_every_log(project: Project, code: Path) -> Non
 
 @pytest.mark.release
 def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path) -> None:
-    replace(code / "export/overbound.py", '"""', '"""Again. ')
+    replace(code / "extensions/exports/overbound.py", '"""', '"""Again. ')
     assert project.job_list() == {("exports", "")}
 
 

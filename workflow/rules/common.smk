@@ -175,6 +175,9 @@ def tried(step):
 ADDED_TABLES = {}
 """The tables of all sensors that extensions add, with the files that they are joined from."""
 
+ADDED_OUTPUTS = []
+"""Outputs of extensions that a run makes, and no other rule reads."""
+
 JOBS = {}
 """The wildcards of the jobs of a step that is not of every sensor or recording."""
 

@@ -1,4 +1,4 @@
-"""What is read: the pages of the report, figures for print, models that filters load."""
+"""What is read: the pages of the report, and figures for print."""
 
 
 rule report:
@@ -45,23 +45,3 @@ rule figures:
         code=plan.code("figures"),
     script:
         "../scripts/figures.py"
-
-
-rule exports:
-    input:
-        recordings=table("recordings"),
-        parameters=table("parameters"),
-        allan=table("allan"),
-        temperature=table("temperature"),
-        draws=every("draws.parquet"),
-    output:
-        folder=directory(RESULTS + "/exports"),
-    log:
-        LOGS + "/exports.log",
-    resources:
-        **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.05)),
-    params:
-        settings=plan.settings("exports"),
-        code=plan.code("exports"),
-    script:
-        "../scripts/exports.py"

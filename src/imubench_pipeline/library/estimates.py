@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import count_threads
@@ -17,6 +17,7 @@ from imubench_pipeline.library.shown import Shown, ShownMapping, Summary, cut
 from imubench_pipeline.model.recordings import DoubtRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import derive_doubts
+from imubench_pipeline.registry import find_function
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from imubench_pipeline.export.modes import Mode
 
 _SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
@@ -183,7 +183,7 @@ class Estimates(ShownMapping[ChannelEstimate]):
         target: str,
         path: "str | Path | None" = None,
         *,
-        mode: "Mode | None" = None,
+        mode: Literal["bench", "bounded", "in-use"] | None = None,
         axis: str = "worst",
         horizon: float | str = 60.0,
         rate: float | None = None,
@@ -220,22 +220,17 @@ class Estimates(ShownMapping[ChannelEstimate]):
         ValueError
             If the program is not known or cannot hold the noise, or the log is unfit.
         """
-        from imubench_pipeline.export.request import Request
-        from imubench_pipeline.library.exports import export_estimates
-
-        request = Request(
-            sensor=self.log.sensor,
-            target=target,
-            axis=axis,
-            horizon=parse_setting(horizon, "time", "horizon"),
-            inflation=inflation,
-            because=because,
-            mode=mode,
-            latitude=latitude,
-            rate=rate,
-            method=self.method,
-        )
-        return export_estimates(self, target, path, request)
+        options = {
+            "axis": axis,
+            "horizon": parse_setting(horizon, "time", "horizon"),
+            "inflation": inflation,
+            "because": because,
+            "mode": mode,
+            "latitude": latitude,
+            "rate": rate,
+        }
+        content: str | bytes = find_function("export_estimates")(self, target, path, options)
+        return content
 
     def _summary(self) -> Summary:
         names = {estimate.model.name for estimate in self.values()}

@@ -20,9 +20,7 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
-from imubench_pipeline.run import calibrate_command as calibration
 from imubench_pipeline.run import convert_command as conversion
-from imubench_pipeline.run import export_command as exports
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import sensors_command as sensors
@@ -315,12 +313,6 @@ COMMANDS = {
             "a log or the sensor file is missing, or incomplete",
         ),
     ),
-    "calibrate": command_line.Command(
-        "estimate the noise in logs, and write the file of a filter, such as Kalibr's imu.yaml",
-        calibration.add_arguments,
-        calibration.run,
-        ("written", "", "a log cannot be used, or is incomplete, or the program cannot hold it"),
-    ),
     "init": command_line.Command(
         "make a folder of logs",
         project.add_init_arguments,
@@ -338,6 +330,7 @@ COMMANDS = {
         ),
         passes_on=True,
     ),
+    **_ADDED.by_key(),
     "schema": command_line.Command(
         "write the JSON Schema of a configuration file, for editors",
         _add_schema,
@@ -361,13 +354,10 @@ COMMANDS = {
         ),
     ),
     "formats": command_line.Command(
-        "list the logs that are read, and the exports", lambda _: None, formats.run, ("listed",)
-    ),
-    "export": command_line.Command(
-        "write the input file of a filter or simulator",
-        exports.add_arguments,
-        exports.run,
-        ("written", "", "the program cannot hold it, or " + command_line.NO_RESULTS),
+        "list the log formats, and the programs of the exports",
+        lambda _: None,
+        formats.run,
+        ("listed",),
     ),
     "show": command_line.Command(
         "show the comparison of the sensors in the terminal",
@@ -417,7 +407,6 @@ COMMANDS = {
         verification.run,
         ("all results are unchanged", "something is not", "there are no results"),
     ),
-    **_ADDED.by_key(),
     "completion": command_line.Command(
         "print a completion script for the shell", _add_completion, _completion, ("printed",)
     ),

@@ -1,28 +1,32 @@
-"""`imubench formats`: list the supported log formats and export programs."""
+"""`imubench formats`: list the supported log formats, and what extensions add."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+
+from imubench_pipeline.registry import Hook
 
 Line = Sequence[str]
+Listing = tuple[str, Sequence[Line]]  # a title, and lines: first the header
+
+_ADDED: Hook[Callable[[], Listing]] = Hook("listings")
 
 
 def run(_: argparse.Namespace) -> int:
-    """Print both tables; return the exit status."""
-    print("Logs that are read: `reader` of a sensor file, mostly found in the file itself")
-    print("\n".join(_aligned(list(list_log_formats()))))
-    print("\nPrograms that files are written for: `imubench export --target`, `exports: targets`")
-    print("\n".join(_aligned(list(list_export_targets()))))
+    """Print all tables; return the exit status."""
+    listings = (list_log_formats(), *(listed() for listed in _ADDED.objects()))
+    parts = ["\n".join([title, *_aligned(lines)]) for title, lines in listings]
+    print("\n\n".join(parts))
     return 0
 
 
-def list_log_formats() -> Iterator[Line]:
-    """Yield the header and a line per format of log files."""
+def list_log_formats() -> Listing:
+    """Return a line per format of log files."""
     # Only this command needs these: the others answer at once.
     from imubench_pipeline.readers.formats import FILE_FORMATS
 
-    yield "reader", "format", "files", "compressed", "columns of time", "settings of its own"
-    for name, log_format in FILE_FORMATS.items():
-        yield (
+    heads = ("reader", "format", "files", "compressed", "columns of time", "settings of its own")
+    lines = [
+        (
             name,
             log_format.title,
             " ".join(log_format.endings),
@@ -30,15 +34,10 @@ def list_log_formats() -> Iterator[Line]:
             ", ".join(log_format.time_columns) or "any",
             ", ".join(log_format.settings) or "none",
         )
-
-
-def list_export_targets() -> Iterator[Line]:
-    """Yield the header and a line per program for exported noise models."""
-    from imubench_pipeline.export.targets import TARGETS
-
-    yield "target", "program", "file", "terms"
-    for target in TARGETS.values():
-        yield target.name, target.program, target.file_name, target.family
+        for name, log_format in FILE_FORMATS.items()
+    ]
+    title = "Logs that are read: `reader` of a sensor file, mostly found in the file itself"
+    return title, [heads, *lines]
 
 
 def _aligned(lines: Sequence[Line]) -> Iterator[str]:

@@ -18,8 +18,6 @@ import pyarrow.compute as pc
 from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
-from imubench_pipeline.export.overbound import overbound
-from imubench_pipeline.export.request import curve_of
 from imubench_pipeline.extensions.aided.axis_states import make_axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
 from imubench_pipeline.extensions.aided.runs import (
@@ -45,6 +43,8 @@ from imubench_pipeline.extensions.aided.trajectories import (
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.exports.overbound import overbound
+from imubench_pipeline.extensions.exports.request import curve_of
 from imubench_pipeline.model.estimates import AllanRow, LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import FLOOR, NoiseModel

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.run.analysis.project import Stated
     from imubench_pipeline.run.plan import Plan
 
+_TABLES = ("recordings", "findings", "doubts", "parameters", "allan", "models", "temperature")
 _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and bytes
 
 
@@ -173,7 +174,6 @@ def say(text: str) -> None:
 
 def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.Namespace) -> None:
     """Write the page, the figures and the tables."""
-    from imubench_pipeline.export.request import NEEDED as EXPORTED
     from imubench_pipeline.report.publish import make_site, render_one_file
     from imubench_pipeline.report.static_figures.files import list_drawings
     from imubench_pipeline.tables.files import write_arrow, write_content
@@ -198,9 +198,8 @@ def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.N
         with _draw_in_parallel(figures, arguments.cores):
             site = make_site(tables, json.dumps(settings_of_report), plan.run.results)
             write_content(render_one_file(site), folder / "report.html")
-            for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
+            for name in _TABLES:
                 write_arrow(tables[name], folder / f"{name}.csv")
-            for name in EXPORTED:
                 write_arrow(tables[name], folder / "tables" / f"{name}.parquet")
             for drawn in plan.run.results.glob("recordings/*/*/draws.parquet"):
                 copy = folder / drawn.relative_to(plan.run.results)

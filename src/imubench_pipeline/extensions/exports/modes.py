@@ -1,0 +1,154 @@
+"""Modes of an exported file: as measured at rest, an upper bound, or the noise in use.
+
+At rest a sensor has less noise than on a vehicle, and most filters need more than the Allan
+variance says. ``bench`` is the noise at rest; ``bounded`` an upper bound of it (`overbound`);
+``in-use`` is at least the broadband noise of a log in use or, without such a log, the values that
+the authors of the program use or recommend.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
+from imubench_pipeline.extensions.exports.in_use import InUseNoise
+from imubench_pipeline.extensions.exports.mapping import as_walk
+from imubench_pipeline.extensions.exports.targets import Target
+from imubench_pipeline.words.reasons import exports as texts
+
+Mode = Literal["bench", "bounded", "in-use"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+
+Densities = Mapping[str, tuple[float, float]]  # N and K of gyro and accel, SI
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Least noise for a filter in use without a log in use, by the authors of its program."""
+
+    source: str
+    factor: float = 1.0  # on all densities at rest
+    densities: Callable[[float], Densities] = lambda _: {}  # for a rate in Hz
+
+
+_TIMES_10 = Floor(
+    "10 times the noise at rest, the least that the documentation of OpenVINS recommends", 10.0
+)
+
+
+def _per_step(gyro: tuple[float, float], accel: tuple[float, float], step: float) -> Densities:
+    """Return the densities of noises of a filter step, s, as of PX4: value times root of step."""
+    root = math.sqrt(step)
+    return {"gyro": (gyro[0] * root, gyro[1] * root), "accel": (accel[0] * root, accel[1] * root)}
+
+
+_EKF2 = Floor(
+    "the defaults of EKF2", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 3e-3), 0.01)
+)
+
+_TEN_TIMES = ("kalibr", "openvins", "basalt", "orb-slam3", "gtsam", "matlab-factor", "ceres")
+
+FLOORS: Mapping[str, Floor] = {
+    **dict.fromkeys(_TEN_TIMES, _TIMES_10),
+    "lio-sam": Floor(
+        "the example configuration of LIO-SAM",
+        densities=lambda _: {"gyro": (1.564e-3, 3.564e-5), "accel": (3.994e-3, 6.436e-5)},
+    ),
+    "fast-lio": Floor(
+        "the example configurations of FAST-LIO",
+        densities=lambda rate: dict.fromkeys(
+            ("gyro", "accel"), (math.sqrt(0.1 / rate), math.sqrt(1e-4 / rate))
+        ),
+    ),
+    "vins-fusion": Floor(
+        "the example configurations of VINS-Fusion",
+        densities=lambda rate: {
+            "gyro": (0.01 / math.sqrt(2.0 * rate), 1e-4 / math.sqrt(rate)),
+            "accel": (0.1 / math.sqrt(2.0 * rate), 1e-3 / math.sqrt(rate)),
+        },
+    ),
+    "px4": _EKF2,
+    "px4-mavparm": _EKF2,
+    "ardupilot": Floor(
+        "the defaults of EKF3", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 0.02), 0.012)
+    ),
+}
+"""Floors by target. Sources: rpng/open_vins, docs/gs-calibration.dox; HKUST-Aerial-Robotics/
+VINS-Fusion, config/euroc/euroc_mono_imu_config.yaml; TixiaoShan/LIO-SAM, config/params.yaml;
+hku-mars/FAST_LIO, config/avia.yaml; PX4-Autopilot, src/modules/ekf2 (parameters
+EKF2_GYR_NOISE, EKF2_ACC_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE, at EKF2_PREDICT_US); ArduPilot,
+libraries/AP_NavEKF3/AP_NavEKF3.cpp (GYRO_P_NSE_DEFAULT and so on, the same of all vehicles)."""
+
+_MIN_RATIO_IN_USE = 1.2
+"""Of the noise in use over the noise at rest: below it, the sensor was hardly in use."""
+
+FLIGHT_TARGETS = frozenset({"px4", "px4-mavparm", "ardupilot"})
+"""Programs that fly: noise at rest is written for them only if it is asked for."""
+
+
+def choose_mode(mode: Mode | None, target: str) -> Mode:
+    """Return the mode of a file: as asked, else ``in-use`` for a program that flies."""
+    return mode or ("in-use" if target in FLIGHT_TARGETS else "bench")
+
+
+def apply_mode(
+    imu: Imu, target: Target, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
+) -> Imu:
+    """Return the noise of a sensor for a mode, with the mode in words.
+
+    ``measured`` is the noise in use by channel. Raises ExportError if neither it nor the authors of
+    the program say what noise is expected in use.
+    """
+    if mode != "in-use":
+        return replace(imu, mode=texts.MODE_WORDS[mode])
+    if measured is not None:
+        floors = {
+            quantity: (max(own.N for own in channels.values()), 0.0)
+            for quantity in ("gyro", "accel")
+            if (channels := {c: own for c, own in measured.items() if c.startswith(quantity)})
+        }
+        each = [
+            texts.channel_in_use(channel, own.N, own.motion, own.lines)
+            for channel, own in measured.items()
+        ]
+        words = texts.noise_in_use(next(iter(measured.values())).cutoff, each)
+        if all(
+            floors[name][0] < _MIN_RATIO_IN_USE * axis.model.N
+            for name, axis in imu.axes.items()
+            if name in floors
+        ):
+            words = f"{texts.NO_MORE_THAN_AT_REST} {words}"
+        return _raise_to(imu, target, floors, 1.0, words)
+    if target.name not in FLOORS:
+        raise ExportError(
+            f"nobody recommends noise in use for {target.program}; expected --in-use LOG, a log of "
+            "the sensor with motors on or on the way"
+        )
+    floor = FLOORS[target.name]
+    words = texts.floor_in_use(floor.source)
+    return _raise_to(imu, target, floor.densities(imu.rate), floor.factor, words)
+
+
+def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words: str) -> Imu:
+    """Return the noise raised to densities N and K, or by a factor."""
+
+    def raise_axis(axis: AxisNoise | None, quantity: str) -> AxisNoise | None:
+        if axis is None:
+            return None
+        least_N, least_K = floors.get(quantity, (0.0, 0.0))
+        model = inflate(axis.model, factor)
+        notes = list(axis.notes)
+        if least_K > 0.0 and target.family == "N+K":
+            mapped = as_walk(model, imu.horizon, imu.rate)
+            model = replace(mapped.model, K=max(mapped.model.K, least_K))
+            notes += mapped.words
+        model = replace(model, N=max(model.N, least_N))
+        notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
+        raised = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
+        each = {letter: one for letter, one in raised.items() if one is not None}
+        limited = axis.slow_limited and model.K == axis.model.K
+        return replace(axis, model=model, notes=notes, each=each, slow_limited=limited)
+
+    gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
+    return replace(imu, gyro=gyro, accel=accel, mode=words)

@@ -1,0 +1,213 @@
+"""The numbers in the files of programs: parameter of the noise, unit and convention of each.
+
+A program is declared once. Its writer computes and writes the numbers by this declaration, and the
+page "Which numbers go into which filter" lists them.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from imubench_pipeline.extensions.exports.comments import describe_model, format_comments
+from imubench_pipeline.extensions.exports.imu import AXES, AxisNoise, ExportError, Imu, split_axes
+from imubench_pipeline.extensions.exports.mapping import (
+    Mapped,
+    as_process,
+    as_walk,
+    find_common_time,
+)
+from imubench_pipeline.extensions.exports.overbound import Family
+from imubench_pipeline.noise import NoiseModel, compute_driving_density
+from imubench_pipeline.units import convert
+
+_UNITS = {"gyro": {"x": "rad/s", "dx": "rad/s^2"}, "accel": {"x": "m/s^2", "dx": "m/s^3"}}
+"""SI units of a reading and of its rate of change."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A way to state a parameter of a noise model."""
+
+    formula: str  # in N, K, T_B, sigma_B of the process, the rate, and the horizon h
+    si: str  # unit, where {x} is the unit of a reading and {dx} of its rate of change
+    convention: str  # continuous or per sample; density, variance or standard deviation; sides
+    compute: Callable[[NoiseModel, float, float], float]
+    """Value in SI, from a model that the program supports, the rate in Hz, and the horizon in s."""
+
+
+def compute_process_deviation(model: NoiseModel) -> float:
+    """Return the stationary standard deviation of the Gauss-Markov process of a model, SI."""
+    if model.T_B is None or model.B == 0.0:
+        return 0.0
+    return math.sqrt(compute_driving_density(model.B, model.T_B) * model.T_B / 2.0)
+
+
+_ROOT, _DENSITY = "continuous, root of a two-sided density", "continuous, two-sided density"
+_DEVIATION, _VARIANCE = "per sample, standard deviation", "per sample, variance"
+_FILTER, _STATIONARY = "per step of the filter, standard deviation", "standard deviation"
+
+WHITE = Form("N", "{x}/sqrt(Hz)", _ROOT, lambda m, rate, h: m.N)
+WALK = Form("K", "{dx}/sqrt(Hz)", _ROOT, lambda m, rate, h: m.K)
+WHITE_DENSITY = Form("N^2", "({x})^2/Hz", _DENSITY, lambda m, rate, h: m.N**2)
+WALK_DENSITY = Form("K^2", "({dx})^2/Hz", _DENSITY, lambda m, rate, h: m.K**2)
+SAMPLE = Form("N sqrt(rate)", "{x}", _DEVIATION, lambda m, rate, h: m.N * rate**0.5)
+STEP = Form("K sqrt(rate)", "{dx}", _DEVIATION, lambda m, rate, h: m.K * rate**0.5)
+MIDPOINT = Form("N sqrt(2 rate)", "{x}", _DEVIATION, lambda m, rate, h: m.N * (2 * rate) ** 0.5)
+SAMPLE_VARIANCE = Form("N^2 rate", "({x})^2", _VARIANCE, lambda m, rate, h: m.N**2 * rate)
+STEP_VARIANCE = Form("K^2 rate", "({dx})^2", _VARIANCE, lambda m, rate, h: m.K**2 * rate)
+FILTER_SAMPLE = replace(SAMPLE, formula="N / sqrt(dt)", convention=_FILTER)  # of the rate 1 / dt
+FILTER_STEP = replace(STEP, formula="K / sqrt(dt)", convention=_FILTER)
+AVERAGED = Form(
+    "sqrt(N^2 / h + K^2 h / 3)",
+    "{x}",
+    _STATIONARY,
+    lambda m, rate, h: (m.N**2 / h + m.K**2 * h / 3.0) ** 0.5,
+)  # error of the mean over the horizon as the bias at its end
+READING = Form(
+    "N^2 rate + N^2 / h + 5/6 K^2 h",
+    "({x})^2",
+    _VARIANCE,
+    lambda m, rate, h: m.N**2 * (rate + 1.0 / h) + 5.0 / 6.0 * m.K**2 * h,
+)  # of readings over a horizon, without the mean over the horizon before
+PROCESS = Form("sigma_B", "{x}", _STATIONARY, lambda m, rate, h: compute_process_deviation(m))
+DRIVE = Form(
+    "sigma_B sqrt(2 / T_B)",
+    "{dx}/sqrt(Hz)",
+    _ROOT,
+    lambda m, rate, h: compute_process_deviation(m) * (2.0 / (m.T_B or h)) ** 0.5,
+)
+TIME = Form("T_B", "s", "time", lambda m, rate, h: m.T_B or h)  # h for a model without a process
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A number in the file of a program."""
+
+    name: str  # in the file
+    quantity: Literal["gyro", "accel", "both"]  # both: one number for gyro and accelerometer
+    form: Form
+    si: str
+    unit: str  # in the file
+
+    def compute(self, model: NoiseModel, rate: float, horizon: float) -> float:
+        """Return the number in the file; the rate is in Hz, the horizon in s."""
+        value = self.form.compute(model, rate, horizon)
+        return value if self.unit == self.si else float(convert(value, self.si, self.unit))
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program, its convention, and the numbers in its file."""
+
+    name: str
+    family: Family  # terms that it supports; an overbound for it has these
+    source: str  # address of the text that defines the numbers
+    convention: str = ""  # words for the file, with {rate}
+    entries: Sequence[Entry] = ()  # none for a file of matrices
+    each: bool = False  # whether it takes a number of each axis
+    positive: bool = False  # whether it takes no 0
+    one_time: bool = False  # whether all processes have the same T_B
+
+
+def declare(
+    name: str,
+    source: str,
+    convention: str,
+    *rows: tuple[Any, ...],
+    family: Family = "N+K",
+    **more: bool,
+) -> Program:
+    """Return a program, from rows of a form and the names of the numbers of gyro and accelerometer.
+
+    Units of both may follow; SI by default. The name None is one number for both quantities.
+    """
+    made = []
+    for form, gyro, accel, *units in rows:
+        names: dict[Literal["gyro", "accel", "both"], str]
+        names = {"gyro": gyro, "accel": accel} if accel else {"both": gyro}
+        for place, (quantity, own) in enumerate(names.items()):
+            si = form.si.format(**_UNITS.get(quantity, {}))
+            made.append(Entry(own, quantity, form, si, units[place] if units else si))
+    return Program(name, family, source, convention, made, **more)
+
+
+def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
+    """Return gyro and accelerometer as white noise and a random walk, or one process.
+
+    For a program with numbers of each axis, these are the axes that have an estimate
+    (`imu.split_axes`). If one has a 0 that the program does not take, the chosen axis replaces it.
+    Raises ExportError if a quantity is missing, or the chosen axis has such a 0.
+    """
+    imu.require_both()
+    axes = split_axes(imu.axes) if program.each else imu.axes
+    models = [axis.model for axis in axes.values()]
+    time = find_common_time(models, imu.horizon) if program.one_time else None
+
+    letters = ("N", "K" if program.family == "N+K" else "B") if program.positive else ()
+
+    def map_axis(axis: AxisNoise) -> tuple[Mapped, list[str]]:
+        """Return the model for the program, and the words against it."""
+        if program.family == "N+K":
+            one = as_walk(axis.model, imu.horizon, imu.rate)
+        else:
+            one = as_process(axis.model, imu.horizon, imu.rate, time=time)
+        zeros = [letter for letter in letters if not getattr(one.model, letter) > 0.0]
+        return one, [
+            f"{letter} is 0, and {program.name} takes values above 0 only" for letter in zeros
+        ]
+
+    mapped = {}
+    for name, axis in axes.items():
+        mapped[name], against = map_axis(axis)
+        if against and name not in imu.axes:
+            words = [f"{words}; the noise of the chosen axis is used" for words in against]
+            chosen, against = map_axis(imu.axes[name.split()[0]])
+            mapped[name] = replace(chosen, words=[*words, *chosen.words])
+        if against:
+            raise ExportError(f"{name}: {against[0]}; a longer log, or an overbound, gives one")
+    return mapped
+
+
+def describe(
+    imu: Imu, program: Program, mapped: Mapping[str, Mapped], *, temperature: bool = False
+) -> list[str]:
+    """Return the header of the file of a program (see `comments.describe_model`)."""
+    words = program.convention.format(rate=imu.rate)
+    return describe_model(
+        imu, program.name, words, mapped, temperature=temperature, each=program.each
+    )
+
+
+def compute_values(entry: Entry, imu: Imu, mapped: Mapping[str, Mapped]) -> list[float]:
+    """Return the numbers of x, y and z; an axis without an estimate has the one of the chosen."""
+    quantity = "gyro" if entry.quantity == "both" else entry.quantity
+    models = [mapped.get(f"{quantity} {axis}") or mapped[quantity] for axis in AXES]
+    return [entry.compute(one.model, imu.rate, imu.horizon) for one in models]
+
+
+def format_entries(
+    program: Program, imu: Imu, mapped: Mapping[str, Mapped], line: str, of: str = ""
+) -> str:
+    """Return numbers by a template of a line; of one quantity if `of` names it.
+
+    The template has ``{name}``, ``{x}`` or ``{xyz}`` for one number or three with commas, and
+    ``{about}`` for formula and unit.
+    """
+    text = ""
+    for entry in program.entries:
+        if of in ("", entry.quantity):
+            xyz = [f"{value:.6e}" for value in compute_values(entry, imu, mapped)]
+            about = f"{entry.form.formula}, {entry.unit}"
+            text += line.format(name=entry.name, x=xyz[0], xyz=", ".join(xyz), about=about) + "\n"
+    return text
+
+
+YAML = "{name}: {x}  # {about}"  # template of `format_entries`
+
+
+def compose(imu: Imu, program: Program, line: str, mark: str = "#") -> tuple[str, str]:
+    """Return the header of a file as comments, and its numbers by `format_entries`."""
+    mapped = map_models(imu, program)
+    head = format_comments(describe(imu, program, mapped), mark)
+    return head, format_entries(program, imu, mapped, line)
