@@ -33,6 +33,12 @@ def read_text(page: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page)).split())
 
 
+def unpack(page: str) -> str:
+    """Return a page with the rows of its tables that are packed."""
+    script = r'<script type="text/html"[^>]*data-packed>([^<]*)</script>'
+    return re.sub(script, lambda one: zlib.decompress(base64.b64decode(one[1])).decode(), page)
+
+
 def run(*arguments: str) -> str:
     """Return the output of a command on one line."""
     said = io.StringIO()
@@ -53,7 +59,8 @@ def main() -> int:
     ranking = RankingRow.rows_of(pq.read_table(tables / "ranking.parquet"))
     shortlist = ShortlistRow.rows_of(pq.read_table(tables / "shortlist.parquet"))
     listed = {(row.requirement, row.sensor): row for row in shortlist}
-    start, buying = ((report / name).read_text() for name in ("index.html", "shortlist.html"))
+    start = (report / "index.html").read_text()
+    buying = unpack((report / "shortlist.html").read_text())
     packed = re.search(
         r'<script[^>]*class="page"[^>]*>(.*?)</script>', (report / "compare.html").read_text(), re.S
     )

@@ -11,7 +11,6 @@ from imubench_pipeline.model.comparisons import CoverageRow
 from imubench_pipeline.report.catalogue import (
     compare_with_paper,
     make_catalogue_tables,
-    make_vendor_lines,
 )
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.settings.sensor import Sensor
@@ -93,7 +92,7 @@ def test_heads_have_units_of_the_system() -> None:
             assert signs <= {head["unit"].sign for head in table["heads"] if head["unit"]}
 
 
-def test_published_figures_are_counted_by_figure_and_by_vendor() -> None:
+def test_published_figures_are_counted_by_figure() -> None:
     rows = read(
         *covered("b", {"N": "yes", "temperature_coefficient": "not looked up"}),
         *covered("a", {"N": "yes", "temperature_coefficient": "other convention"}, vendor="u"),
@@ -105,17 +104,6 @@ def test_published_figures_are_counted_by_figure_and_by_vendor() -> None:
     assert [line["name"] for line in gyro["lines"]] == ["u A", "V B", "V C"]
     assert accel["counts"] == ["0 of 1 looked up", "0 of 0 looked up; 1 not looked up"]
     assert list(make_catalogue_tables([], [], "practical")) == []
-    lines = list(make_vendor_lines(rows))
-    assert [line["vendor"] for line in lines] == ["u", "V", None]
-    assert [line["sensors"] for line in lines] == [1, 2, 3]
-    assert [line["not_looked_up"] for line in lines] == [0, 2, 2]
-    shares = [[share["of"] for share in line["shares"]] for line in lines]
-    assert shares == [
-        ["2 of 2", "2 of 2", "0 of 0"],
-        ["2 of 4", "2 of 3", "0 of 1"],
-        ["4 of 6", "4 of 5", "0 of 1"],
-    ]
-    assert [share["text"] for share in lines[1]["shares"]] == ["50 %", "67 %", "0 %"]
 
 
 def test_the_claim_of_the_paper_has_the_numbers_of_the_catalogue() -> None:

@@ -17,8 +17,12 @@ from imubench_pipeline.report.pages import ENTRIES, list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import BY_RECORDING
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import shipped_sensors
+from imubench_pipeline.steps.shortlist import list_shortlist
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
 from tests.report.test_boards import BOARD, of_board, some
+from tests.report.test_catalogue import covered
 from tests.report.test_navigated import navigation_row
 
 pytestmark = pytest.mark.usefixtures("small_report")
@@ -43,11 +47,14 @@ class Tables(dict[str, pa.Table]):
 def whole() -> Site:
     """A site that has every page."""
     asked = {"robot": ROBOT}
+    robot = {"robot": Requirement.model_validate(ROBOT)}
+    catalogue = {"bmi088": shipped_sensors()["bmi088"]}
     rows = [
         *some(),
         recording_rows("asked", "day1", requirements=asked),
         rejected_rows("turned", "day1", kind="two_position"),
-        {"navigation": [navigation_row("asked")]},
+        {"navigation": [navigation_row("asked")], "coverage": covered("asked", {"N": "yes"})},
+        {"shortlist": [row.columns() for row in list_shortlist(robot, catalogue, {})]},
     ]
     tables = joined(*rows, requirements=asked, papers=True)
     return site(tables, requirements=asked, boards={"pair": BOARD})
@@ -61,7 +68,7 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     of_recordings = BY_RECORDING if entry.views(noting) else ()
     page = entry.page(noting)
     # What tells which recordings there are, and their names, is in the key of every page.
-    assert noting.views and noting.navigation and noting.names
+    assert noting.views and noting.existing and noting.names
     tables.read.clear()
     noting._rows.clear()
     assert page.context()
@@ -80,6 +87,15 @@ def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:
     assert (tmp_path / "index.html").is_file()
 
 
+def test_the_menu_has_few_entries_and_leads_to_every_page(whole: Site) -> None:
+    menu, *_ = (whole.shown()[name] for name in ("menu", "experiments"))
+    assert isinstance(menu, list) and len(menu) <= 6
+    published = {page.path: page for page in list_pages(whole)}
+    templates = publishing.make_templates(whole.system)
+    text = publishing._render(whole, templates, published["experiments.html"])
+    assert all(f'href="{entry.file}"' in text for entry in whole.existing)
+
+
 def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None:
     declared = [
         value
@@ -91,5 +107,5 @@ def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None
     assert {entry.file for entry in declared} == {entry.file for entry in ENTRIES}
     assert len({entry.file for entry in ENTRIES}) == len(ENTRIES)
     assert len({entry.title for entry in ENTRIES}) == len(ENTRIES)
-    assert [file for file, _ in whole.navigation] == [entry.file for entry in ENTRIES]
+    assert [entry.file for entry in whole.existing] == [entry.file for entry in ENTRIES]
     assert {entry.file for entry in ENTRIES} <= {page.path for page in list_pages(whole)}

@@ -19,7 +19,7 @@ from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.report import pages
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.folder import count_attempt, read_failed_pages
-from imubench_pipeline.report.pages import ENTRIES, list_pages
+from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import load_site, publish, render_one_file
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.start import START
@@ -47,6 +47,7 @@ from tests.report.tables import (
 
 ASSETS = {f"assets/{name}" for name in ("report.css", "report.js", "search.js", "plotly.min.js")}
 OF_ALL = {"index.html", "recordings.html", "datasheets.html", "fusion.html"}
+ALWAYS = {"index.html", "recordings.html", "experiments.html", "theory.html", "made.html"}
 KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
 THEORY_FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
@@ -66,12 +67,12 @@ def _quick() -> Iterator[None]:
 
 
 def once(made: Site) -> set[str]:
-    """The pages that there is one of: none of boards, the Earth's rate, navigation and papers."""
-    absent = {"boards.html", "earth_rate.html", "navigation.html", "papers.html"}
-    if not any(view.static for view in made.views):
-        absent |= {"compare.html"}
-    files = {entry.file for entry in ENTRIES} - absent
-    assert files == {path for path, _ in made.navigation} > OF_ALL
+    """The pages that there is one of: those of experiments and of catalogues are absent."""
+    shown = {"datasheets.html": "coverage", "fusion.html": "fusion"}
+    files = ALWAYS | {page for page, table in shown.items() if made.tables[table].num_rows}
+    if any(view.static for view in made.views):
+        files |= {"compare.html"}
+    assert files == {entry.file for entry in made.existing}
     return files
 
 
@@ -1014,7 +1015,7 @@ def test_a_page_that_fails_stops_no_other_page(
 ) -> None:
     def broken(site: Site) -> list[Any]:
         return [
-            replace(page, context=lambda: {}["lost"]) if page.path == "fusion.html" else page
+            replace(page, context=lambda: {}["lost"]) if page.path == "theory.html" else page
             for page in list_pages(site)
         ]
 
@@ -1025,14 +1026,14 @@ def test_a_page_that_fails_stops_no_other_page(
         assert count_attempt(tmp_path) == attempt
         made = site(tables)
         written = publish(made, tmp_path)
-        assert made.failed == read_failed_pages(tmp_path) == {"fusion.html": "KeyError: 'lost'"}
+        assert made.failed == read_failed_pages(tmp_path) == {"theory.html": "KeyError: 'lost'"}
         assert ("recordings.html" in written) == (attempt == 0)
-        assert "KeyError: &#39;lost&#39;" in (tmp_path / "fusion.html").read_text()
+        assert "KeyError: &#39;lost&#39;" in (tmp_path / "theory.html").read_text()
     assert "KeyError" in capsys.readouterr().err
     assert "KeyError: &#39;lost&#39;" in render_one_file(site(tables))
     monkeypatch.setattr(publishing, "list_pages", list_pages)
     made = site(tables)
-    assert publish(made, tmp_path) == ["fusion.html"]
+    assert publish(made, tmp_path) == ["theory.html"]
     assert (made.failed, read_failed_pages(tmp_path), count_attempt(tmp_path)) == ({}, {}, 0)
 
 

@@ -35,7 +35,7 @@ def test_everything_that_has_a_name_is_found_and_is_there(tmp_path: Path) -> Non
     assert titles[f"{made.names['two']}: torn"] == "recordings/two/torn.html"
     assert titles["angle random walk"].startswith("theory.html#")
     assert {file for kind, _, file, _ in found if kind == "page"} == {
-        file for file, _ in made.navigation
+        entry.file for entry in made.existing
     }
     pages = read_pages(tmp_path)
     lost = [path for _, _, path, _ in found if not there(pages, unquote(path))]

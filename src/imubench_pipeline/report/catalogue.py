@@ -12,7 +12,6 @@ from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_figure_unit
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.settings.printed import Kind, convert_density, convert_power_density
-from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.words.numbers import join_names, percent_text
 
@@ -133,19 +132,6 @@ def format_counts(published: Iterable[str]) -> str:
     return f"{text}; {unknown} not looked up" if unknown else text
 
 
-def make_vendor_lines(rows: Sequence[CoverageRow]) -> Iterator[Json]:
-    """Yield the share of published figures of each vendor, and last of all vendors together."""
-    for vendor in (*sorted({row.vendor for row in rows}, key=str.lower), None):
-        own = [row for row in rows if vendor in (row.vendor, None)]
-        several = [[row for row in own if row.quantity == quantity] for quantity in QUANTITIES]
-        yield {
-            "vendor": vendor,
-            "sensors": len({row.sensor for row in own}),
-            "shares": [_make_share(rows) for rows in (own, *several)],
-            "not_looked_up": sum(row.published == "not looked up" for row in own),
-        }
-
-
 def _make_share(rows: Sequence[CoverageRow]) -> Json:
     """Return the share of published figures among those looked up."""
     published = sum(row.published in _PUBLISHED for row in rows)
@@ -183,7 +169,6 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
         },
         "tables": list(make_catalogue_tables(covered, site.rows(CatalogueRow), site.system)),
-        "vendors": list(make_vendor_lines(covered)),
         "claim": compare_with_paper(covered) if covered else "",
     }
 
@@ -193,6 +178,7 @@ DATASHEETS = Entry(
     title="Datasheets",
     context=_make_context,
     tables=("catalogue", "coverage"),
+    exists=lambda site: bool(site.rows(CoverageRow)),
     views=lambda site: site.views,
 )
 """The page of all comparisons with datasheets, and of the figures that vendors publish."""

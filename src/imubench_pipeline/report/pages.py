@@ -49,7 +49,12 @@ def _describe_theory(site: Site) -> Mapping[str, object]:
     return {"figure": encode_figure(draw_theory_figure(site.system)), "terms": read_glossary()}
 
 
-THEORY = Entry(file="theory.html", title="Theory", context=_describe_theory)
+THEORY = Entry(
+    file="theory.html",
+    title="Theory",
+    about="the numbers of this report, explained: from a log at rest to navigation errors",
+    context=_describe_theory,
+)
 """The page that the terms of all other pages link to."""
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "snakemake")
@@ -94,23 +99,32 @@ def _describe_making(site: Site) -> Mapping[str, object]:
     }
 
 
-MADE = Entry(file="made.html", title="How this was made", context=_describe_making)
+MADE = Entry(
+    file="made.html",
+    title="How this was made",
+    about="commands, versions and settings",
+    context=_describe_making,
+)
 """The page that the footer of every page links to."""
 
+
+EXPERIMENTS = Entry(file="experiments.html", title="Experiments and method", context=lambda _: {})
+"""The page that lists the pages that are not in the menu."""
 
 _ADDED: Hook[Entry] = Hook("pages")
 
 ENTRIES: Sequence[Entry] = (
     start.START,
     compare.COMPARE,
-    start.RECORDINGS,
-    catalogue.DATASHEETS,
     shortlist.SHORTLIST,
+    catalogue.DATASHEETS,
+    EXPERIMENTS,
+    start.RECORDINGS,
     *sorted(_ADDED.objects(), key=lambda entry: entry.place),
     THEORY,
     MADE,
 )
-"""The pages that exist once, in the order of the navigation; the first is the start page."""
+"""The pages that exist once, in the order of the menu; the first is the start page."""
 
 
 def list_pages(site: Site) -> Iterator[Page]:
@@ -125,6 +139,6 @@ def list_pages(site: Site) -> Iterator[Page]:
     for path in dict.fromkeys(view.device_page for view in site.views):
         if path is not None:
             yield make_device_page(site, path)
-    first, *others = (entry for entry in site.entries if entry.exists(site))
+    first, *others = site.existing
     for entry in (*others, first):
         yield entry.page(site)

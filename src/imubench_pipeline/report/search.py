@@ -39,8 +39,8 @@ def _list_entries(site: Site) -> Iterator[Found]:
         yield "device", f"{site.names[view.sensor]}: device {view.row.device}", quote(page), ""
     for name, requirement in site.settings["requirements"].items():
         yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
-    for file, title in site.navigation:
-        yield "page", title, file, ""
+    for entry_of in site.existing:
+        yield "page", entry_of.title, entry_of.file, entry_of.about
     for entry in read_glossary().values():
         yield "term", entry.name, f"theory.html#{entry.section}", entry.short
     for entries_of in _ADDED.objects():

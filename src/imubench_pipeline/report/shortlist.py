@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from imubench_pipeline.model.comparisons import ShortlistRow
+from imubench_pipeline.model.comparisons import CoverageRow, ShortlistRow
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import join_names, number_text
 from imubench_pipeline.words.verdicts import (
@@ -17,6 +17,7 @@ from imubench_pipeline.words.verdicts import (
 
 def _make_context(site: Site) -> Mapping[str, object]:
     asked = site.settings["requirements"]
+    names = {row.sensor: f"{row.vendor} {row.model}" for row in site.rows(CoverageRow)} | site.names
     boards: dict[str, list[Mapping[str, object]]] = {}
     for row in site.rows(ShortlistRow):
         margins = (row.margin, row.noise_margin, row.likely_margin)
@@ -27,7 +28,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "conditions": list(_list_conditions(row)),
             "parts": list(map(share_text, row.parts)),
             "origins": origins_text(row.parts),
-            "name": site.names.get(row.sensor, row.sensor),
+            "name": names.get(row.sensor, row.sensor),
             "logged": row.sensor in site.sensors,
             "margins": [(number_text(margin, 3), margin) for margin in margins],
         }
@@ -49,7 +50,11 @@ def _list_conditions(row: ShortlistRow) -> Iterator[str]:
 
 
 SHORTLIST = Entry(
-    file="shortlist.html", title="Before buying", context=_make_context, tables=("shortlist",)
+    file="shortlist.html",
+    title="Before buying",
+    context=_make_context,
+    tables=("coverage", "shortlist"),
+    exists=lambda site: bool(site.rows(ShortlistRow)),
 )
 """The page of all sensors of the catalogue, for every requirement."""
 

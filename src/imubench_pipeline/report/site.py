@@ -67,7 +67,7 @@ class Entry:
     """A page that occurs once in a report, declared in the module of its content."""
 
     file: str  # its name; its template is called so, too, with ``.jinja``
-    title: str  # its name in the navigation
+    title: str
     context: "Callable[[Site], Mapping[str, object]]"  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
@@ -76,7 +76,8 @@ class Entry:
     # returns the files of recordings that it shows: the same
     files: "Callable[[Site], Iterable[Path]]" = lambda _: ()
     exists: "Callable[[Site], bool]" = lambda _: True  # returns whether a report has it
-    place: int = 0  # in the navigation, among the pages of extensions
+    about: str = ""  # what it shows, for the page of experiments; empty: it is in the menu
+    place: int = 0  # among the pages of extensions
 
     @property
     def sections(self) -> "list[Section]":
@@ -121,7 +122,7 @@ class Site:
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # from `imubench_pipeline.run.plan.Plan.report_settings`
     results: Path  # folder of the results, for the tables of each recording
-    entries: Sequence[Entry]  # pages that exist once, in the order of the navigation
+    entries: Sequence[Entry]  # pages that exist once, in the order of the menu
     code: str = ""  # digest of the code that makes the pages
     failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
     _rows: dict[str, list[Any]] = field(default_factory=dict, init=False)
@@ -188,9 +189,9 @@ class Site:
         return {(row.sensor, row.recording) for row in self.rows(of)}
 
     @cached_property
-    def navigation(self) -> list[tuple[str, str]]:
-        """The pages of the navigation bar, with their names."""
-        return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
+    def existing(self) -> list[Entry]:
+        """The pages that this report has once."""
+        return [entry for entry in self.entries if entry.exists(self)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -256,7 +257,11 @@ class Site:
     def common(self) -> str:
         """Digest of the common content of all pages: settings, names, code."""
         return _make_digest(
-            self.settings, self.names, self.navigation, self.code, version(_PACKAGE)
+            self.settings,
+            self.names,
+            [entry.file for entry in self.existing],
+            self.code,
+            version(_PACKAGE),
         )
 
     def key_of(self, *parts: object) -> str:
@@ -267,7 +272,8 @@ class Site:
         """Return the data of the site for all templates; ``alone``: for a report of one file."""
         return {
             "title": self.title,
-            "navigation": self.navigation,
+            "menu": [entry for entry in self.existing if not entry.about],
+            "experiments": [entry for entry in self.existing if entry.about],
             "units": {quantity: list(choices) for quantity, choices in list_page_units().items()},
             "first_units": choose_first_units(self.system),
             "names": self.names,

@@ -491,6 +491,10 @@ START = Entry(
 """The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
 RECORDINGS = Entry(
-    file="recordings.html", title="Recordings", context=_recordings, views=lambda site: site.views
+    file="recordings.html",
+    title="Recordings",
+    about="every recording with its status, length, rate and warnings",
+    context=_recordings,
+    views=lambda site: site.views,
 )
 """The page that lists every recording with its state."""

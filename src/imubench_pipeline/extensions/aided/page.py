@@ -95,6 +95,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
 NAVIGATION = Entry(
     file="navigation.html",
     title="Navigation",
+    about="filters on simulated drives with outages of GNSS: which tuning, which sensor",
     context=_make_context,
     tables=("navigation",),
     exists=lambda site: bool(site.rows(NavigationRow)),

@@ -398,6 +398,7 @@ def _select_recordings(site: Site) -> list[RecordingView]:
 EARTH_RATE_PAGE = Entry(
     file="earth_rate.html",
     title="Earth’s rate",
+    about="a gyro turned between north and south: how well it senses the Earth’s rate",
     context=_make_context,
     views=_select_recordings,
     exists=lambda site: bool(_select_recordings(site)),

@@ -67,7 +67,13 @@ def _make_context(site: Site) -> Mapping[str, object]:
 
 
 FUSION = Entry(
-    file="fusion.html", title="Fusion", context=_make_context, tables=("fusion", "grades"), place=2
+    file="fusion.html",
+    title="Fusion",
+    about="how many cheap sensors match one good sensor",
+    context=_make_context,
+    tables=("fusion", "grades"),
+    exists=lambda site: bool(site.rows(FusionRow) or site.rows(GradeRow)),
+    place=2,
 )
 
 
@@ -242,6 +248,7 @@ def _select_recordings(site: Site, board: str) -> list[RecordingView]:
 BOARDS = Entry(
     file="boards.html",
     title="Boards",
+    about="boards with several sensors: one by one and together",
     context=_make_boards_context,
     views=lambda site: [
         view for name in site.settings["boards"] for view in _select_recordings(site, name)

@@ -15,7 +15,7 @@ from imubench_pipeline.words.numbers import count_digits, number_text, percent_t
 
 def _make_context(site: Site) -> dict[str, Any]:
     of_recordings = {view.page for view in site.views if not view.left_out}
-    there = of_recordings | {file for file, _ in site.navigation}  # pages to link to
+    there = of_recordings | {entry.file for entry in site.existing}  # pages to link to
     rows = site.rows(PublishedRow)
     drawn = _select_curves(site)
     return {
@@ -45,6 +45,7 @@ PAPERS_PAGE = Entry(
     place=5,
     file="papers.html",
     title="Papers",
+    about="what three papers print, with the computed values",
     context=_make_context,
     tables=("published", "accuracy"),
     views=_select_recordings,
