@@ -30,6 +30,7 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Grade, Sensor
 from imubench_pipeline.units import SI_UNITS, parse_quantity
 
 FILE = Path(__file__).with_name("class_limits.csv")
+_GRADE_FILE = Path(__file__).with_name("grade_limits.csv")
 """The limits of the shipped catalogue."""
 
 STATEMENTS: Mapping[Cause, tuple[str, ...]] = {
@@ -257,4 +258,19 @@ def read_class_limits(path: Path = FILE) -> list[ClassLimit]:
             pairs = (each.split(" ") for each in row["sensors"].split(_SEPARATOR))
             values = {name: float(value) for name, value in pairs}
             limits.append(_summarise(row["grade"], row["quantity"], row["figure"], values))
+    return limits
+
+
+@cache
+def read_grade_limits(quantity: str) -> Mapping[str, Mapping[str, float]]:
+    """Return the largest N and B of each grade, SI, the worst grade first; consumer has none.
+
+    The file names the source of each limit. Between grades, figures of the catalogue overlap; these
+    limits are for orientation, not for verdicts.
+    """
+    limits: dict[str, dict[str, float]] = {}
+    with _GRADE_FILE.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            if row["quantity"] == quantity:
+                limits.setdefault(row["grade"], {})[row["figure"]] = float(row["limit"])
     return limits

@@ -34,6 +34,12 @@ TERM_COLOURS = tuple(
 )
 """Colours of the terms of a model and of the sources of an error, by their place."""
 
+AXIS_STYLES = {
+    axis: Appearance(*_COLOURS[place], "solid", marker)
+    for place, (axis, marker) in enumerate((("x", "circle"), ("y", "square"), ("z", "diamond")))
+}
+"""The appearance of the axes of a triad in one figure."""
+
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 _INK_COLOURS = ("#1b1b1b", "#e8e8e8")

@@ -122,15 +122,6 @@ class ComparedChannel:
 
 def pack_compared_channel(view: ChannelView) -> ComparedChannel:
     """Return the data of a channel in a comparison: curve, models, parameters."""
-    parameters: dict[str, dict[str, list[list[object]]]] = {}
-    for method in (view.recommended, "likelihood_gm"):
-        if method in view.parameters:
-            # Value, limits and status of each component, with the digits of `report.publish`.
-            parameters[method] = {
-                symbol: [[*map(_round, (r.value, r.lower, r.upper)), r.status] for r in rows]
-                for symbol in FOREST
-                if (rows := view.named(method, symbol))
-            }
     models = {}
     for method in view.parameters:
         model, tau = view.model(method), view.tau
@@ -138,10 +129,24 @@ def pack_compared_channel(view: ChannelView) -> ComparedChannel:
             tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
         models[method] = pack_logarithms(tau), pack_logarithms(_compute_curve(model, tau))
     return ComparedChannel(
-        {name: getattr(view, name) for name in _ABOUT} | {"parameters": parameters},
+        {name: getattr(view, name) for name in _ABOUT}
+        | {"parameters": _pack_parameters(view, (view.recommended, "likelihood_gm"))},
         {name: pack_logarithms(getattr(view, name)) for name in _CURVE},
         models,
     )
+
+
+def _pack_parameters(view: ChannelView, methods: Iterable[str]) -> Json:
+    """Return value, limits and status of each component, with the digits of `report.publish`."""
+    return {
+        method: {
+            symbol: [[*map(_round, (r.value, r.lower, r.upper)), r.status] for r in rows]
+            for symbol in FOREST
+            if (rows := view.named(method, symbol))
+        }
+        for method in methods
+        if method in view.parameters
+    }
 
 
 def _round(value: float | None) -> float | None:
@@ -159,6 +164,7 @@ def pack_channel(view: ChannelView, arrays: Arrays) -> Json:
     return {
         **{name: getattr(view, name) for name in _ABOUT},
         **{name: arrays.log(getattr(view, name)) for name in _CURVE},
+        "parameters": _pack_parameters(view, (view.recommended,)),
         "methods": {
             method: {
                 "tau": arrays.log(curve["tau"]),

@@ -7,7 +7,7 @@ import math
 import traceback
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -18,16 +18,19 @@ import pyarrow as pa
 from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
+from imubench_pipeline.datasheets.class_limits import read_grade_limits
 from imubench_pipeline.estimators.estimate import SHOWN
+from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import find_term, read_glossary
 from imubench_pipeline.report.pages import ENTRIES, list_pages, read_plotting_script
-from imubench_pipeline.report.palette import TERM_COLOURS
+from imubench_pipeline.report.palette import AXIS_STYLES, TERM_COLOURS
 from imubench_pipeline.report.practical import System, choose_page_unit, list_page_units
 from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.report.search import make_search_index
 from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.files import read, read_json, write_content
 from imubench_pipeline.tables.provenance import digest_sources
@@ -302,6 +305,9 @@ def _make_assets() -> dict[str, str]:
             ("SYMBOL_TEXTS", {symbol: symbol_text(symbol) for symbol in SHOWN}),
             ("TERMS", terms),
             ("TERM_COLOURS", TERM_COLOURS),
+            ("AXIS_LOOKS", {axis: asdict(look) for axis, look in AXIS_STYLES.items()}),
+            ("GRADES", {quantity: read_grade_limits(quantity) for quantity in QUANTITIES}),
+            ("FLOOR", FLOOR),
         )
     )
     return {

@@ -18,7 +18,7 @@ from imubench_pipeline.report.comparison import make_methods_table
 from imubench_pipeline.report.datasheets import compare_with_datasheet
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
-from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words import numbers
@@ -181,6 +181,11 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         "notes": [row for row in numbered if row["severity"] == "note"],
         "channels": [
             _describe_channel(site, view, channel, samples, of_models) for channel in channels
+        ],
+        "quantities": [
+            (quantity, name)
+            for quantity, name in QUANTITY_NAMES.items()
+            if any(channel.quantity == quantity for channel in channels)
         ],
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],

@@ -19,6 +19,49 @@ function channelOf(figure) {
   ));
 }
 
+// The axes of the gyroscope or of the accelerometer in one figure.
+kinds.axes = (figure) => {
+  const views = pageData.channels.filter(({ channel }) => quantityOf(channel) === figure.dataset.quantity);
+  const unit = unitOf(figure.dataset.quantity, "adev");
+  const ranges = { x: logRange(views.flatMap((view) => array(view.tau)), 0.1), y: logRange(views.flatMap((view) => scaled(view.adev, unit.factor)), 0.5, 0.3) };
+  const { soft } = inks();
+  const plain = { light: soft, dark: soft };
+  const grades = gradeBands(figure.dataset.quantity, unit, ranges);
+  const marks = noiseMarks(views, ranges);
+  const curves = views.map((view) => {
+    const look = AXIS_LOOKS[view.channel.split("_")[1]] ?? sensorLook(view.sensor);
+    const colour = colourOf(look);
+    const best = view.methods[view.recommended];
+    return {
+      look, key: view.channel,
+      under: limitsOf(view, unit, look, 0.16, [view.channel, "limits"]),
+      over: [
+        curveOf(view, unit, view.channel.replace("_", " "), { group: view.channel, mode: "markers", marker: { color: colour, symbol: look.marker, size: 5 } }),
+        ...(best ? [line(array(best.tau), scaled(best.model, unit.factor), { ...look, width: 2 }, { group: [view.channel, "model"], name: `${view.channel.replace("_", " ")}, model` })] : []),
+        ...view.datasheet.map((printed) => line(array(view.tau), printedLine(printed, array(view.tau), unit), { ...MARKED, dash: "dot", width: 1.4 }, {
+          group: [view.channel, "datasheet"], hoverinfo: "name", name: `datasheet: ${printed.label}`, meta: { guide: true },
+        })),
+      ],
+    };
+  });
+  return {
+    traces: [...grades.traces, ...curves.flatMap(({ under }) => under), ...marks.traces, ...curves.flatMap(({ over }) => over)],
+    labels: [...grades.labels.map((label) => ({ ...label, group: "grades" })), ...marks.labels.map((label) => ({ ...label, group: "marks" }))],
+    groups: [
+      ...curves.map(({ key, look }) => ({ key, label: key.replace("_", " "), on: true, look })),
+      { key: "grades", label: "grades", on: true, look: { ...plain, filled: true }, more: true },
+      { key: "marks", label: "N, B and K", on: true, look: { ...plain, dash: "dash" }, more: true },
+      { key: "model", label: "fitted model", on: true, look: plain, more: true },
+      { key: "limits", label: "95 % limits", on: true, look: { ...plain, filled: true }, more: true },
+      { key: "datasheet", label: "datasheet", on: true, look: { ...MARKED, dash: "dot" }, more: true, absent: views.every((view) => view.datasheet.length === 0) },
+    ],
+    layout: {
+      margin: { l: 60, r: GRADE_MARGIN, t: 14, b: 50 },
+      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
+    },
+  };
+};
+
 kinds.allan = (figure) => {
   const view = channelOf(figure);
   const unit = unitOf(quantityOf(view.channel), "adev");

@@ -122,6 +122,169 @@ function logRange(values, below, above = below) {
   return least <= most ? [Math.log10(least) - below, Math.log10(most) + above] : [0, 1];
 }
 
+const pen = document.createElement("canvas").getContext("2d");
+
+function textSize(text, size) {
+  pen.font = `${size}px system-ui, sans-serif`;
+  const lines = text.split("<br>").map(plainText);
+  return [Math.max(...lines.map((each) => pen.measureText(each).width)), lines.length * size * 1.3];
+}
+
+// Pixels of a value on an axis of a figure of some size.
+function pixelsOn(layout, name, [width, height]) {
+  const { l, r, t, b } = layout.margin;
+  const { range, type, domain = [0, 1] } = layout[name];
+  const [from, to] = name[0] === "x" ? [l, width - r] : [height - b, t];
+  return (value) => from + (to - from) * (domain[0] + (domain[1] - domain[0]) * (((type === "log" ? Math.log10(value) : value) - range[0]) / (range[1] - range[0])));
+}
+
+// Tick labels of a logarithmic axis: every second or third where they would touch.
+function thinTicks(layout, size) {
+  for (const name of axesOf(layout).reverse()) {
+    const { type, range, tickvals, ticktext } = layout[name];
+    if (type !== "log" || !range || !tickvals) continue;
+    // Room for the labels of y, before places are calculated.
+    if (name === "yaxis") layout.margin = { ...layout.margin, l: Math.max(layout.margin.l, 42 + Math.max(...ticktext.map((text) => textSize(text, layout.font.size)[0]))) };
+    const place = pixelsOn(layout, name, size);
+    const sides = ticktext.map((text) => textSize(text, layout.font.size)[name[0] === "x" ? 0 : 1]);
+    const fits = (step) => tickvals.every((value, i) => i % step > 0 || i + step >= tickvals.length
+      || Math.abs(place(tickvals[i + step]) - place(value)) > (sides[i] + sides[i + step]) / 2 + (name[0] === "x" ? 7 : 1));
+    const step = [1, 2, 3, 4, 5, 6].find(fits) ?? 7;
+    // The lowest label of y would touch the first one of x.
+    const inCorner = (value) => name[0] === "y" && size[1] - layout.margin.b - place(value) < 10;
+    layout[name] = { ...layout[name], ticktext: ticktext.map((text, i) => (i % step === 0 && !inCorner(tickvals[i]) ? text : "")) };
+  }
+}
+
+// Annotations for labels { x, y, text, colour } at places where they cover neither each other nor,
+// if possible, a curve; a line leads to the point. Labels with `span` are beside the axes, within
+// that range of y.
+function placeLabels(labels, layout, size, traces) {
+  const [px, py] = ["xaxis", "yaxis"].map((name) => pixelsOn(layout, name, size));
+  const { l, r, t, b } = layout.margin;
+  const inside = [l, t, size[0] - r, size[1] - b];
+  const crosses = (one, other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3];
+  const points = [];
+  for (const { x, y, fill, line: edge } of traces) {
+    if (fill || edge?.width === 0) continue;
+    let before = null;
+    for (let i = 0; i < x.length; i += 1) {
+      const at = [px(x[i]), py(y[i])];
+      const far = before ? Math.hypot(at[0] - before[0], at[1] - before[1]) : 0;
+      for (let part = Math.min(200, Math.ceil(far / 6)) || 1; Number.isFinite(at[0] + at[1]) && part > 0; part -= 1) {
+        const share = before ? part / (Math.ceil(far / 6) || 1) : 1;
+        points.push(before ? [before[0] + share * (at[0] - before[0]), before[1] + share * (at[1] - before[1])] : at);
+      }
+      before = Number.isFinite(at[0] + at[1]) ? at : null;
+    }
+  }
+  const taken = [];
+  const made = [];
+  const fontSize = Math.min(layout.font.size, 12);
+  for (const { x, y, text, colour, span } of labels) {
+    const [wide, high] = textSize(text, fontSize).map((side) => side + 4);
+    const boxAt = (left, level) => [left - wide / 2, level - high / 2, left + wide / 2, level + high / 2];
+    const font = { size: fontSize, color: colour };
+    if (span) {
+      const [low, top] = span.map((end) => Math.min(inside[3], Math.max(inside[1], py(end))));
+      const box = boxAt(inside[2] + 4 + wide / 2, (low + top) / 2);
+      if (low - top < high || taken.some((other) => crosses(box, other))) continue;
+      taken.push(box);
+      made.push({ xref: "paper", x: 1, xshift: 4, yref: "paper", y: (inside[3] - (low + top) / 2) / (inside[3] - inside[1]), xanchor: "left", yanchor: "middle", text, showarrow: false, font });
+      continue;
+    }
+    const [left, level] = [px(x), py(y)];
+    if (!crosses([left, level, left, level].map((each, i) => each + (i < 2 ? -1 : 1)), inside)) continue;
+    let best = null;
+    for (const far of [12, 24, 40, 60, 85, 115, 150]) {
+      for (let turn = 0; turn < 16; turn += 1) {
+        const [ax, ay] = [(far + wide / 2) * Math.cos((turn * Math.PI) / 8), -(far + high / 2) * Math.sin((turn * Math.PI) / 8)];
+        const box = boxAt(left + ax, level + ay);
+        if (box[0] < inside[0] || box[1] < inside[1] || box[2] > inside[2] || box[3] > inside[3] || taken.some((other) => crosses(box, other))) continue;
+        const cost = far + 12 * points.filter((point) => crosses([...point, ...point], box)).length;
+        if (!best || cost < best.cost) best = { cost, ax, ay, box };
+      }
+    }
+    if (!best) continue;
+    taken.push(best.box);
+    const [along, up] = [["xaxis", x], ["yaxis", y]].map(([name, value]) => (layout[name].type === "log" ? Math.log10(value) : value));
+    made.push({
+      xref: "x", yref: "y", x: along, y: up, ax: best.ax, ay: best.ay, xanchor: "center", yanchor: "middle", text, showarrow: true, standoff: 4,
+      arrowhead: 0, arrowwidth: 1, arrowcolor: colour, font, bgcolor: faint(inks().paper, 0.8), borderpad: 1,
+    });
+  }
+  return made;
+}
+
+// Light bands of the grades behind an Allan deviation: traces of the group "grades", and labels for
+// the right margin, which should be GRADE_MARGIN wide.
+const GRADE_MARGIN = 74;
+
+function gradeBands(quantity, unit, ranges) {
+  const { soft } = inks();
+  const tau = Array.from({ length: 41 }, (_, i) => 10 ** (ranges.x[0] - 2 + (i / 40) * (ranges.x[1] - ranges.x[0] + 4)));
+  const grades = Object.entries(GRADES[quantity]);
+  const limit = ({ N, B }) => (time) => unit.factor * Math.hypot(N / Math.sqrt(time), FLOOR * B);
+  const [top, bottom] = [10 ** (ranges.y[1] + 3), 10 ** (ranges.y[0] - 3)];
+  const edges = [() => top, ...grades.map(([, of]) => limit(of)), () => bottom];
+  const names = ["consumer", ...grades.map(([name]) => name)];
+  const end = 10 ** ranges.x[1];
+  return {
+    traces: names.flatMap((name, i) => band(tau, tau.map(edges[i + 1]), tau.map(edges[i]), { light: soft, dark: soft }, 0.02 + 0.06 * i, { group: "grades", name: `${name} grade`, meta: { guide: true } })),
+    labels: names.map((name, i) => ({ text: name, colour: soft, span: [edges[i + 1](end), edges[i](end)] })),
+  };
+}
+
+// The points and slopes of N, B and K of one or more channels: traces of the group "marks", and a
+// label each with the range of the values.
+function noiseMarks(views, ranges) {
+  const quantity = quantityOf(views[0].channel);
+  const { ink, soft, paper } = inks();
+  const level = unitOf(quantity, "adev");
+  const made = { traces: [], labels: [] };
+  const tau = [0, 1].map((side) => 10 ** ranges.x[side]);
+  for (const [symbol, name, slope] of [["N", "N", -0.5], ["B_curve", "B", 0], ["K", "K", 0.5]]) {
+    const of = (view) => view.parameters[view.recommended]?.[symbol]?.find(([value]) => value !== null);
+    const found = views.map((view) => of(view) ?? (symbol === "B_curve" ? view.parameters[view.recommended]?.B?.find(([value]) => value !== null) : undefined)).filter(Boolean);
+    if (found.length === 0) continue;
+    const values = found.map(([value]) => value).sort((a, b) => a - b);
+    const middle = Math.exp(values.reduce((sum, value) => sum + Math.log(value), 0) / values.length);
+    const along = (time) => level.factor * middle * (slope < 0 ? time ** -0.5 : slope > 0 ? Math.sqrt(time / 3) : FLOOR);
+    let at = { N: 1, B_curve: flatTime(views[0], FLOOR * middle), K: 3 }[symbol];
+    const visible = (time) => time > tau[0] && time < tau[1] && Math.log10(along(time)) > ranges.y[0] && Math.log10(along(time)) < ranges.y[1];
+    if (!visible(at)) at = slope > 0 ? tau[1] / 1.6 : tau[0] * 1.6;
+    if (!visible(at)) continue;
+    const ends = slope === 0 ? [at / 10, at * 10] : tau;
+    const x = Array.from({ length: 31 }, (_, i) => ends[0] * (ends[1] / ends[0]) ** (i / 30)).filter((time) => Math.log10(along(time)) > ranges.y[0]);
+    const guide = { group: "marks", name: `${name} (slope)`, meta: { guide: true } };
+    made.traces.push(line(x, x.map(along), { light: soft, dark: soft, dash: "dash", width: 1 }, guide), {
+      ...guide, type: "scatter", mode: "markers", x: [at], y: [along(at)], hoverinfo: "skip", marker: { color: paper, size: 9, line: { color: ink, width: 2 } },
+    });
+    const unit = unitOf(quantity, symbol);
+    const text = values.length > 1 ? interval(values[0] * unit.factor, values.at(-1) * unit.factor) : estimateTexts(...found[0].slice(0, 3), unit)[0];
+    made.labels.push({ x: at, y: along(at), text: `<b>${name}</b> ${text} ${unit.sign}`, colour: ink });
+  }
+  return made;
+}
+
+// The averaging time at which a curve is flat and nearest to a level.
+function flatTime(view, level) {
+  const [tau, size] = [array(view.tau), array(view.adev).map(Math.log)];
+  const cost = (i) => Math.abs(size[i] - Math.log(level)) + Math.abs((size[i + 1] - size[i - 1]) / Math.log(tau[i + 1] / tau[i - 1]));
+  return tau[tau.reduce((best, _, i) => (i > 0 && i + 1 < tau.length && !(cost(i) >= cost(best)) ? i : best), 1)];
+}
+
+// Labels of the figure, and what they must not cover, for another placement after a zoom.
+const dressed = new WeakMap();
+
+function dress(figure, layout, made, size) {
+  thinTicks(layout, size);
+  const labels = (made.labels ?? []).filter(({ group }) => !group || shown(figure, group));
+  const own = layout.annotations ?? [];
+  dressed.set(figure, { labels, own });
+  if (labels.length > 0) layout.annotations = [...own, ...placeLabels(labels, layout, size, made.traces)];
+}
+
 // Labels follow when the reader zooms.
 function followZoom(figure, canvas) {
   canvas.on("plotly_relayout", (changes) => {
@@ -133,7 +296,11 @@ function followZoom(figure, canvas) {
       const { tickvals, ticktext } = logTicks(...axis.range);
       Object.assign(update, { [`${name}.tickvals`]: tickvals, [`${name}.ticktext`]: ticktext });
     }
-    if (Object.keys(update).length > 0) Plotly.relayout(canvas, update);
+    if (Object.keys(update).length > 0) {
+      const { labels, own } = dressed.get(figure);
+      if (labels.length > 0) update.annotations = [...own, ...placeLabels(labels, canvas.layout, [canvas.clientWidth, canvas.clientHeight], canvas.data)];
+      Plotly.relayout(canvas, update);
+    }
   });
 }
 
@@ -181,6 +348,7 @@ function drawFigure(figure) {
   if (paper) Object.assign(layout, { width: paper.width, height });
   wholes.set(figure, Object.fromEntries(axesOf(layout).map((name) => [name, `${layout[name].range}`])));
   zoomIn(figure, layout);
+  dress(figure, layout, { ...made, traces }, [paper?.width ?? canvas.clientWidth, height ?? canvas.clientHeight]);
   const first = !drawn.has(figure);
   drawn.add(figure);
   if (figure.dataset.sketched) canvas.replaceChildren();
@@ -217,6 +385,7 @@ function swatch(look) {
 function drawControls(figure, groups) {
   const controls = figure.querySelector(".controls");
   if (!controls) return;
+  const folded = element("details", { className: "more" }, element("summary", { textContent: "More" }));
   for (const group of groups) {
     const box = element("input", { type: "checkbox", checked: shown(figure, group.key), onchange: () => {
       choices.get(figure).set(group.key, box.checked);
@@ -224,8 +393,9 @@ function drawControls(figure, groups) {
     } });
     const label = element("label", { className: "toggle" }, box, element("span"), ` ${group.label}`);
     label.dataset.group = group.key;
-    controls.append(label);
+    (group.more ? folded : controls).append(label);
   }
+  if (folded.childElementCount > 1) controls.append(folded);
   if (groups.length > 8) controls.append(allOrNone(figure, groups, true), allOrNone(figure, groups, false));
 }
 

@@ -23,6 +23,9 @@ function sketchFigure(figure) {
   const canvas = figure.querySelector(".canvas");
   if (made.height) canvas.style.height = `${made.height}px`;
   const traces = made.traces.filter((trace) => isOn(trace, (group) => on.get(group) ?? true));
+  choices.set(figure, on);
+  dress(figure, layout, { ...made, traces }, [canvas.clientWidth, canvas.clientHeight]);
+  choices.delete(figure);
   const drawing = new Sketch(canvas.clientWidth, canvas.clientHeight, layout, traces);
   canvas.replaceChildren(drawing.svg);
   figure.dataset.sketched = "yes";
@@ -137,9 +140,11 @@ class Sketch {
       : svg("rect", { x: Math.min(left, right), y: Math.min(low, high), width: Math.abs(right - left), height: Math.abs(high - low), fill: fillcolor ?? "none", ...look }));
   }
 
-  note({ x, y, xref, yref, xanchor, yanchor, text, font = {} }) {
-    const [left, level] = [this.at("x", xref, x, true), this.at("y", yref, y, true)];
-    if (!Number.isFinite(left + level)) return;
+  note({ x, y, xref, yref, xanchor, yanchor, text, font = {}, ax = 0, ay = 0, xshift = 0 }) {
+    const [from, to] = [this.at("x", xref, x, true) + xshift, this.at("y", yref, y, true)];
+    if (!Number.isFinite(from + to)) return;
+    if (ax || ay) this.svg.append(svg("line", { x1: from, y1: to, x2: from + 0.7 * ax, y2: to + 0.7 * ay, stroke: font.color, opacity: 0.5 }));
+    const [left, level] = [from + ax, to + ay];
     const size = font.size ?? 12;
     const anchor = { left: "start", right: "end" }[xanchor] ?? "middle";
     const down = { top: size, bottom: -3 }[yanchor] ?? size / 3;

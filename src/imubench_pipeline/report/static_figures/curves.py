@@ -9,10 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from imubench_pipeline.datasheets.class_limits import read_grade_limits
 from imubench_pipeline.noise import FLOOR, NoiseModel, Term
 from imubench_pipeline.report.palette import METHOD_STYLES
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.style import (
+    GRADE_SHADES,
     MEASURED,
     SINGLE,
     SUM_LOOK,
@@ -24,6 +26,7 @@ from imubench_pipeline.report.static_figures.style import (
     draw_legend_below,
     fix_layout,
     make_figure,
+    measure_text,
     name_channel,
     name_log,
     set_log_axis,
@@ -83,12 +86,40 @@ def draw_measured(axes: Axes, view: ChannelView, scale: float, *, limits: bool =
     )
 
 
+def draw_grade_bands(axes: Axes, quantity: str, scale: float) -> None:
+    """Draw the bands of the grades behind the curves, named beside the axes where they fit."""
+    low, high = axes.get_ylim()
+    tau = np.geomspace(*axes.get_xlim(), 60)
+    limits = read_grade_limits(quantity)
+    edges = [np.hypot(one["N"] / np.sqrt(tau), FLOOR * one["B"]) * scale for one in limits.values()]
+    edges = [np.full_like(tau, high), *edges, np.full_like(tau, low)]
+    for place, name in enumerate(("consumer", *limits)):
+        upper, lower = (np.clip(edge, low, high) for edge in edges[place : place + 2])
+        shade = GRADE_SHADES[place]
+        axes.fill_between(tau, lower, upper, color=shade, lw=0, zorder=0.0)
+        ends = [float(axes.transData.transform((tau[-1], y))[1]) for y in (lower[-1], upper[-1])]
+        figure = axes.figure.get_figure(root=True)
+        if (ends[1] - ends[0]) * 72.0 / figure.dpi > measure_text(figure, name):
+            middle = float(np.sqrt(lower[-1] * upper[-1]))
+            axes.annotate(
+                name,
+                (1.0, middle),
+                xycoords=("axes fraction", "data"),
+                xytext=(3.0, 0.0),
+                textcoords="offset points",
+                rotation=-90,
+                va="center",
+                color="0.35",
+            )
+
+
 def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: float) -> Figure:
     """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
     limits = (view.lower, view.upper)
     near = [np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale for limit in limits]
     set_log_axis(axes, "x", compute_limits(view.tau))
     set_log_axis(axes, "y", compute_limits(view.adev * scale, *near, list(more), margin=1.4))
+    draw_grade_bands(axes, view.quantity, scale)
     draw_legend_below(figure, axes.get_legend_handles_labels()[0])
     return fix_layout(figure)
 

@@ -25,6 +25,9 @@ SINGLE, DOUBLE = 88.0, 180.0
 """Widths of one and of two columns of a journal, mm."""
 
 MEASURED = "black"
+GRADE_SHADES = ("1.0", "0.975", "0.95", "0.925")
+"""Grey of the bands of the grades, the worst grade first."""
+
 FONT_SIZE = 7.0
 """pt; no text of a figure is smaller."""
 
