@@ -27,6 +27,7 @@ HOOKS: dict[str, type | None] = {  # None: a function
     "commands": Command,
     "library": None,
     "listings": None,
+    "sensor_commands": None,
     "pages": Entry,
     "recording_pages": RecordingPage,
     "sections": Section,

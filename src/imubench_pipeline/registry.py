@@ -50,6 +50,7 @@ class Extension:
     sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
     library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
+    sensor_commands: tuple[str, ...] = ()  # on the page of a sensor
     listings: tuple[str, ...] = ()  # further tables of `imubench formats`
     pages: tuple[str, ...] = ()  # that a report has once
     recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording

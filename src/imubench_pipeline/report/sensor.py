@@ -1,29 +1,46 @@
 """The pages of a sensor and of a device: agreement and change of its recordings."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
 from imubench_pipeline.model import comparisons
+from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_repeatability
+from imubench_pipeline.report.log_screen import group_events
 from imubench_pipeline.report.palette import make_recording_styles
 from imubench_pipeline.report.payload import FOREST, pack_styles
-from imubench_pipeline.report.practical import format_temperature
+from imubench_pipeline.report.practical import System, format_temperature
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import explain_missing_rank, summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.estimates import symbol_text
-from imubench_pipeline.words.numbers import count_digits, counted, number_text
+from imubench_pipeline.words.events import events_text
+from imubench_pipeline.words.numbers import (
+    NO_VALUE,
+    count_digits,
+    counted,
+    number_text,
+    sentence,
+)
 
 _TREND_COLUMNS = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
 _UNIT_SYMBOLS = {"bias": "signal"}
+_MAX_EVENTS = 3
+_COMMANDS: Hook[Callable[[str, str], tuple[str, Iterable[tuple[str, str]]]]] = Hook(
+    "sensor_commands"
+)
+"""Commands for a sensor that extensions add, by the folder of the results: label, then lines."""
+
 _MAX_DETAILED_RECORDINGS = 12
 """With more recordings the page of a sensor has no budgets and no comparison with the datasheet."""
 
@@ -71,11 +88,24 @@ def _make_sensor_context(
     price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
+    chosen = _choose_recording(site, sensor, own)
     return {
         "name": site.names[sensor],
+        "simulated": all(view.simulated for view in own),
         "summary": (f"Price class: {price_class}. " if price_class else "")
         + summarise_recordings(own, several=False),
+        "answer": verdicts.sensor_answer_text(_list_verdicts(site, sensor)),
         "verdicts": list(trace_verdicts(site, sensor, own)),
+        "card": chosen and _describe_card(chosen),
+        "missing": list(_list_missing(own)),
+        "events": list(_list_events(own, site.system)),
+        "commands": {
+            label: list(lines)
+            for add in _COMMANDS.objects()
+            for label, lines in [add(sensor, site.results_name)]
+        }
+        if any(view.static for view in own) and not site.at_once
+        else {},
         "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
         "devices": [
             {"name": name, "page": page, "views": of, "count": counted(len(of), "recording")}
@@ -108,6 +138,53 @@ def _make_sensor_context(
             **together.page,
         },
     }
+
+
+def _list_verdicts(site: Site, sensor: str) -> Iterator[tuple[str, Verdict]]:
+    """Yield the name of each requirement, and the verdict on a sensor."""
+    rows = site.rows(comparisons.RankingRow)
+    stated = {row.requirement: row.verdict for row in rows if row.sensor == sensor and row.decides}
+    for name in site.settings["requirements"] if rows else ():
+        yield name.replace("_", " "), stated.get(name, "not_enough_data")
+
+
+def _choose_recording(
+    site: Site, sensor: str, own: Sequence[RecordingView]
+) -> RecordingView | None:
+    """Return the recording of a card: the one that decides, else the longest, if used if any."""
+    deciding = {
+        row.recording
+        for row in site.rows(comparisons.RankingRow)
+        if row.sensor == sensor and row.decides
+    }
+    drawn = [view for view in own if view.static and view.channels()]
+
+    def preference(view: RecordingView) -> tuple[bool, bool, int, float]:
+        used = view.row.decides is not False
+        return view.name in deciding, used, len(view.channels()), view.row.duration or 0.0
+
+    return max(drawn, key=preference, default=None)
+
+
+def _describe_card(view: RecordingView) -> Mapping[str, object]:
+    shown = {channel.quantity for channel in view.channels()}
+    quantities = [(key, name) for key, name in QUANTITY_NAMES.items() if key in shown]
+    return {"recording": view.name, "quantities": quantities}
+
+
+def _list_missing(own: Sequence[RecordingView]) -> Iterator[str]:
+    """Yield a line for each quantity that no recording has."""
+    shown = {channel.quantity for view in own if view.static for channel in view.channels()}
+    for key, name in QUANTITY_NAMES.items():
+        if shown and key not in shown:
+            yield f"{name}: not in the logs."
+
+
+def _list_events(own: Sequence[RecordingView], system: System) -> Iterator[str]:
+    """Yield the events that matter most in the recordings."""
+    found = [row for view in own for row in view.findings if row.finding not in LEFT_OUT]
+    for event in group_events(found)[:_MAX_EVENTS]:
+        yield sentence(events_text(event.findings, system, event.factors()))
 
 
 def make_device_page(site: Site, page: str) -> Page:
@@ -201,6 +278,14 @@ def describe_change(row: comparisons.DriftRow, *, simulated: bool) -> str:
     return f"{recording}, {where}: {name} changed{by} (p = {chance})."
 
 
+def _describe_margins(row: comparisons.RankingRow) -> str:
+    """Return the margins of a verdict; empty if the sensor is not judged."""
+    if row.margin is None or row.verdict == "excluded":
+        return ""
+    parts = [f"margin in use {number_text(row.margin, 3)}", verdicts.other_margins_text(row)]
+    return ", ".join(filter(None, parts))
+
+
 def trace_verdicts(
     site: Site, sensor: str, own: Sequence[RecordingView]
 ) -> Iterator[Mapping[str, object]]:
@@ -223,10 +308,12 @@ def trace_verdicts(
         }
         if not ranking.groups:
             word, why = verdicts.SHORT_VERDICTS["not_enough_data"], explain_missing_rank(own)
-            yield {**about, "row": None, "verdict": "not_enough_data", "word": word, "why": why}
+            nothing = {"row": None, "verdict": "not_enough_data", "margins": ""}
+            yield {**about, **nothing, "word": word, "why": why}
             continue
         (group,) = ranking.groups
         row = group.row
+        reasons = {limit.reason for limit in group.limits}
         judged = sum(r.rank is not None and r.decides for r in rows if r.requirement == name)
         window = "turn-on biases, not calibrated" if requirement.turn_on else ""
         if requirement.static_window:
@@ -249,6 +336,9 @@ def trace_verdicts(
             else verdicts.stated_verdict(row),
             "group": group,
             "place": f"rank {row.rank} of {judged}" if row.rank else "",
+            "margins": _describe_margins(row),
+            "known": any(limit.sigma != NO_VALUE for limit in group.limits),
+            "same_reason": reasons.pop() if len(reasons) == 1 else "",
             "conditions": [verdicts.condition_text(each) for each in row.conditions],
             "spread": verdicts.spread_text(row),
             "left_out": verdicts.doubts_text(row.left_out, named=True),

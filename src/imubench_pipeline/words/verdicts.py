@@ -324,6 +324,31 @@ def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -
     return ", ".join(parts)
 
 
+_ANSWERS: Mapping[Verdict, str] = {
+    "meets": "Meets the limits of {}.",
+    "likely_meets": "Likely meets the limits of {}.",
+    "meets_if": "Meets the limits of {} if unknown figures are as required.",
+    "not_enough_data": "Not enough data for {}.",
+    "likely_fails": "Likely fails the limits of {}.",
+    "fails": "Fails the limits of {}.",
+    "cannot_meet": "Cannot meet the limits of {}.",
+    "excluded": "Lacks a demanded property for {}.",
+}
+
+
+def sensor_answer_text(judged: Iterable[tuple[str, Verdict]]) -> str:
+    """Return for which requirements a sensor serves, by title and verdict, in a sentence or two."""
+    titles: dict[Verdict, list[str]] = {}
+    for title, verdict in judged:
+        titles.setdefault(verdict, []).append(title)
+    parts = [
+        _ANSWERS[verdict].format(join_names(titles[verdict]))
+        for verdict in SHORT_VERDICTS
+        if verdict in titles
+    ]
+    return " ".join(parts) or "No requirement is stated."
+
+
 def spread_text(row: comparisons.RankingRow) -> str:
     """Return the spread between units, of a row of ``ranking``; empty if it is not known."""
     if row.spread is None or row.spread_of is None:

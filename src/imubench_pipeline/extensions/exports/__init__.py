@@ -15,6 +15,7 @@ EXTENSION = Extension(
         "export": "exports.of_models:export",
         "export_estimates": "exports.of_estimates:export_estimates",
     },
+    sensor_commands=("exports.targets:list_commands",),
     listings=("exports.targets:list_targets",),
     commands={
         "calibrate": "exports.calibrate:COMMAND",

@@ -1,5 +1,6 @@
 """The programs that a noise model can be exported to."""
 
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -78,3 +79,13 @@ def list_targets() -> tuple[str, list[tuple[str, ...]]]:
     lines = [(one.name, one.program, one.file_name, one.family) for one in TARGETS.values()]
     title = "Programs that files are written for: `imubench export --target`, `exports: targets`"
     return title, [("target", "program", "file", "terms"), *lines]
+
+
+def list_commands(sensor: str, results: str) -> tuple[str, list[tuple[str, str]]]:
+    """Return a label, and for each program the command that writes the file of a sensor."""
+    lines = []
+    for one in TARGETS.values():
+        words = ["imubench", "export", f"./{results}" if results.startswith("-") else results]
+        words += [f"--sensor={sensor}", "--target", one.name, "--output", one.file_name]
+        lines.append((one.program, shlex.join(words)))
+    return "Files for filters and simulators", lines

@@ -19,9 +19,12 @@ function channelOf(figure) {
   ));
 }
 
+const printedOf = (view) => view.datasheet ?? pageData.datasheets[view.sensor][view.channel];
+
 // The axes of the gyroscope or of the accelerometer in one figure.
 kinds.axes = (figure) => {
-  const views = pageData.channels.filter(({ channel }) => quantityOf(channel) === figure.dataset.quantity);
+  const { quantity, recording } = figure.dataset;
+  const views = pageData.channels.filter((view) => quantityOf(view.channel) === quantity && view.recording === (recording ?? view.recording));
   const unit = unitOf(figure.dataset.quantity, "adev");
   const ranges = { x: logRange(views.flatMap((view) => array(view.tau)), 0.1), y: logRange(views.flatMap((view) => scaled(view.adev, unit.factor)), 0.5, 0.3) };
   const { soft } = inks();
@@ -31,14 +34,16 @@ kinds.axes = (figure) => {
   const curves = views.map((view) => {
     const look = AXIS_LOOKS[view.channel.split("_")[1]] ?? sensorLook(view.sensor);
     const colour = colourOf(look);
-    const best = view.methods[view.recommended];
+    // The page of a sensor has only the curves of the models.
+    const of = view.methods?.[view.recommended];
+    const best = of ? [of.tau, of.model] : view.models?.[view.recommended];
     return {
       look, key: view.channel,
       under: limitsOf(view, unit, look, 0.16, [view.channel, "limits"]),
       over: [
         curveOf(view, unit, view.channel.replace("_", " "), { group: view.channel, mode: "markers", marker: { color: colour, symbol: look.marker, size: 5 } }),
-        ...(best ? [line(array(best.tau), scaled(best.model, unit.factor), { ...look, width: 2 }, { group: [view.channel, "model"], name: `${view.channel.replace("_", " ")}, model` })] : []),
-        ...view.datasheet.map((printed) => line(array(view.tau), printedLine(printed, array(view.tau), unit), { ...MARKED, dash: "dot", width: 1.4 }, {
+        ...(best ? [line(array(best[0]), scaled(best[1], unit.factor), { ...look, width: 2 }, { group: [view.channel, "model"], name: `${view.channel.replace("_", " ")}, model` })] : []),
+        ...printedOf(view).map((printed) => line(array(view.tau), printedLine(printed, array(view.tau), unit), { ...MARKED, dash: "dot", width: 1.4 }, {
           group: [view.channel, "datasheet"], hoverinfo: "name", name: `datasheet: ${printed.label}`, meta: { guide: true },
         })),
       ],
@@ -53,7 +58,7 @@ kinds.axes = (figure) => {
       { key: "marks", label: "N, B and K", on: true, look: { ...plain, dash: "dash" }, more: true },
       { key: "model", label: "fitted model", on: true, look: plain, more: true },
       { key: "limits", label: "95 % limits", on: true, look: { ...plain, filled: true }, more: true },
-      { key: "datasheet", label: "datasheet", on: true, look: { ...MARKED, dash: "dot" }, more: true, absent: views.every((view) => view.datasheet.length === 0) },
+      { key: "datasheet", label: "datasheet", on: true, look: { ...MARKED, dash: "dot" }, more: true, absent: views.every((view) => printedOf(view).length === 0) },
     ],
     layout: {
       margin: { l: 60, r: GRADE_MARGIN, t: 14, b: 50 },

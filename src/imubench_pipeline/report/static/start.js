@@ -70,7 +70,8 @@ async function startPages(main) {
         link.toggleAttribute("aria-current", resolved(link.getAttribute("href"), "") === page));
       await openPage(main);
     }
-    (section && document.getElementById(section) ? document.getElementById(section) : document.body).scrollIntoView();
+    if (section && document.getElementById(section)) openAround(section);
+    else document.body.scrollIntoView();
   };
   const resolved = (href, from) => {
     const parts = from.split("/").slice(0, -1);
@@ -95,6 +96,13 @@ async function startPages(main) {
   await show();
 }
 
+// Opens what is folded around the place of the address.
+function openAround(id) {
+  const place = id ? document.getElementById(decodeURIComponent(id)) : null;
+  for (let each = place?.closest("details"); each; each = each.parentElement.closest("details")) each.open = true;
+  place?.scrollIntoView();
+}
+
 async function start() {
   const main = document.querySelector("main");
   readState();
@@ -105,7 +113,12 @@ async function start() {
   startPrintingTabs();
   startPrinting();
   if (document.body.dataset.oneFile === "yes") await startPages(main);
-  else await openPage(main);
+  else {
+    await openPage(main);
+    const open = () => openAround(location.hash.slice(1));
+    window.addEventListener("hashchange", open);
+    open();
+  }
   document.documentElement.dataset.ready = "yes";
 }
 
