@@ -13,6 +13,7 @@ async function openPage(main) {
   showUnits(main);
   startTables(main);
   startTabs(main);
+  startCard(main);
   startMatrices(main);
   startChooser(main);
   startComparison(main);
