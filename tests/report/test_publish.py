@@ -271,7 +271,7 @@ def test_what_is_measured_is_not_called_simulated(read: dict[str, Read]) -> None
 
 def test_recording_page_shows_the_simulated_truth(read: dict[str, Read]) -> None:
     rows = read["recordings/two/phantom.html"].naming("truth of the simulation", "tr")
-    assert len(rows) == 2
+    assert len(rows) == 2 * 2  # of each channel: below its values, and below all methods
     assert all("assumed" in row.text for row in rows)
     assert "truth of the simulation" not in read["recordings/one/day1.html"].text
 
@@ -304,7 +304,7 @@ def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) ->
     (row,) = page.naming("a long gap", "tr")
     assert "60 s" in row.text and "117 min" in row.text and "all" in row.text
     (row,) = page.naming("dead", "tr")
-    assert "gyro_y" in row.text
+    assert "gyro y" in row.text
     assert [one["number"] for one in page.data["findings"]] == [1, 2, 3]
     assert page.text.index("dead") < page.text.index("a long gap") < page.text.index("0.5 Hz")
     # A channel of which there are no results has no section to lead to.
@@ -338,7 +338,7 @@ def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:
     drawn = read["recordings/one/day1.html"].data["samples"]
     assert (set(drawn["envelope"]), set(drawn["histogram"])) == ({"gyro_x"}, {"gyro_x"})
     kinds = [one.attributes.get("data-kind") for one in read["recordings/one/day1.html"].elements]
-    assert kinds.count("series") == kinds.count("histogram") == 1
+    assert kinds.count("timeline") == kinds.count("histogram") == 1
     assert read["recordings/two/phantom.html"].data["samples"] == {"envelope": {}, "histogram": {}}
 
 

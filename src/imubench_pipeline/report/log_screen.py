@@ -102,11 +102,15 @@ def _effect(factor: float) -> float:
 
 
 def group_events(findings: Iterable[FindingRow]) -> list[Event]:
-    """Return the events of a recording that matter, the most important first.
+    """Return the events of a recording that matter; signals without an effect are left out."""
+    return [one for one in list_events(findings) if one.score() > 0.0]
+
+
+def list_events(findings: Iterable[FindingRow]) -> list[Event]:
+    """Return the events of a recording, the most important first, notes last.
 
     Sudden findings of all channels are one disturbance if less than 30 s lie between them. Other
-    findings are one event if they are of the same kind. Notes are listed last, and signals without
-    an effect are left out.
+    findings are one event if they are of the same kind.
     """
     sudden: list[FindingRow] = []
     groups: dict[str, list[FindingRow]] = defaultdict(list)
@@ -114,7 +118,9 @@ def group_events(findings: Iterable[FindingRow]) -> list[Event]:
         timed = row.finding in _SUDDEN and row.start is not None
         if not timed:
             groups[f"{row.finding} {row.severity}"].append(row)
-        elif row.severity != "note":
+        elif row.severity == "note":
+            groups[f"{row.finding} note"].append(row)
+        else:
             sudden.append(row)
     disturbances: list[list[FindingRow]] = []
     end = -float("inf")
@@ -124,7 +130,7 @@ def group_events(findings: Iterable[FindingRow]) -> list[Event]:
         disturbances[-1].append(row)
         end = max(end, row.end or row.start or 0.0)
     events = [Event(tuple(group)) for group in (*groups.values(), *disturbances)]
-    return sorted((one for one in events if one.score() > 0.0), key=Event.score, reverse=True)
+    return sorted(events, key=Event.score, reverse=True)
 
 
 def render_log_screen(

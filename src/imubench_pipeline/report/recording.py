@@ -1,5 +1,6 @@
 """The page of one recording and its channels."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning, payload
 from imubench_pipeline.report.comparison import make_methods_table
 from imubench_pipeline.report.datasheets import compare_with_datasheet
+from imubench_pipeline.report.log_screen import Event, list_events
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
@@ -23,6 +25,8 @@ from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words import numbers
 from imubench_pipeline.words.estimates import model_text, precision_text, symbol_text
+from imubench_pipeline.words.events import events_text, missing_axes_texts
+from imubench_pipeline.words.findings.base import channels_text
 
 _TEMPERATURE_TERMS = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
@@ -127,7 +131,6 @@ def _describe_reduction(channel: ChannelView) -> str:
 
 _MAX_HIDDEN_RATE_ERROR = 1e-9  # relative error of a rate up to which the page does not state it
 _SHOWN_MODELS = 4  # models with the lowest BIC that the page lists, besides the model of the papers
-_SEVERITIES = ("fatal", "warning", "note")
 _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
@@ -162,31 +165,33 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
     envelope = read_sample_rows(folder, estimates.EnvelopeRow)
     histogram = read_sample_rows(folder, estimates.HistogramRow)
     channels = view.channels()
-    names = {channel.channel for channel in channels}
-    sorted_findings = sorted(view.findings, key=lambda row: _SEVERITIES.index(row.severity))
-    numbered = [
-        {**row.columns(), "number": i, "linked": row.channel in names}
-        for i, row in enumerate(sorted_findings, start=1)
+    findings = [
+        _describe_event(number, event, site.system)
+        for number, event in enumerate(list_events(view.findings), start=1)
     ]
     samples = payload.pack_samples(envelope, histogram, arrays)
     of_models = read_sample_rows(folder, estimates.ModelSampleRow)
+    described = [_describe_channel(site, view, one, samples, of_models) for one in channels]
     budgets = list(
         meaning.make_budget_tables(view.budget, {view.full_name: view.simulated}, site.system)
     )
     return {
         **describe_recording(site, view, channels, folder),
         "summary": _summarise(view, len(channels)),
-        "findings": numbered,
-        "serious": [row for row in numbered if row["severity"] != "note"],
-        "notes": [row for row in numbered if row["severity"] == "note"],
-        "channels": [
-            _describe_channel(site, view, channel, samples, of_models) for channel in channels
-        ],
+        "findings": findings,
+        "channels": described,
         "quantities": [
-            (quantity, name)
-            for quantity, name in QUANTITY_NAMES.items()
-            if any(channel.quantity == quantity for channel in channels)
+            _tabulate_recommended(quantity, own)
+            for quantity in QUANTITY_NAMES
+            if (own := [one for one in described if one["view"].quantity == quantity])
         ],
+        "missing": []
+        if view.left_out
+        else missing_axes_texts(
+            [channel.channel for channel in channels],
+            [row.channel for row in view.findings if row.channel],
+        ),
+        "has_series": bool(samples["envelope"].keys() - {"temperature"}),
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
@@ -208,12 +213,52 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
             "of_models": payload.pack_model_samples(of_models, arrays),
             "budgets": [meaning.make_budget_bars(view.budget, site.system)] if budgets else [],
             "findings": [
-                {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
-                for row in numbered
+                {name: row[name] for name in ("number", "finding", "channel", "spans", "detail")}
+                for row in findings
             ],
             "arrays": arrays.texts,
         },
     }
+
+
+def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]:
+    """Return an event as a line of the table of findings, and the times of its findings."""
+    first = event.findings[0]
+    text = events_text(event.findings, system, event.factors())
+    text = text if len(event.findings) == 1 else text.removeprefix(_axes_prefix(event))
+    spans = [(row.start, row.start if row.end is None else row.end)
+             for row in event.findings if row.start is not None]  # fmt: skip
+    return {
+        "number": number,
+        "finding": first.finding,
+        "severity": first.severity,
+        "matters": event.score() > 0.0 and first.severity != "note",
+        "channel": channels_text(event.channels),
+        "linked": False,
+        "short": re.split(r"(?<=\D[.;:]) ", numbers.sentence(text), maxsplit=1)[0].rstrip(":;"),
+        "detail": text,
+        "spans": spans,
+        "start": min((start for start, _ in spans), default=None),
+        "end": max((end for _, end in spans), default=None),
+    }
+
+
+def _axes_prefix(event: Event) -> str:
+    where = channels_text(event.channels)
+    return f"{where[:1].upper()}{where[1:]}. " if where else ""
+
+
+def _tabulate_recommended(quantity: str, channels: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the parameters of the recommended methods: a line for each axis."""
+    symbols = list(dict.fromkeys(name for one in channels for name in one["symbols"]))
+    lines = [
+        line | {"view": one["view"], "cells": dict(zip(one["symbols"], line["cells"], strict=True))}
+        for one in channels
+        for line in one["lines"]
+        if line["recommended"] or not line["method"]
+    ]
+    return {"quantity": quantity, "title": QUANTITY_NAMES[quantity], "symbols": symbols,
+            "lines": lines}  # fmt: skip
 
 
 STATIC = RecordingPage("recording.html.jinja", make_recording_context)

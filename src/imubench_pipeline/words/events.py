@@ -1,7 +1,7 @@
 """Sentences about a recording and its events, for the screen of one log."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
@@ -56,6 +56,20 @@ def _spans_text(spans: Sequence[Span]) -> str:
     shown = [f"{number_text(a)} to {number_text(b)} s" for a, b in spans[:_MAX_SPANS]]
     more = len(spans) - len(shown)
     return join_names([*shown, f"{more} more"] if more else shown)
+
+
+def missing_axes_texts(analysed: Collection[str], named: Collection[str]) -> list[str]:
+    """Return a sentence for each sensor whose axes are not all analysed; ``named``: by findings."""
+    texts = []
+    for quantity, name in (("gyro", "Gyroscope"), ("accel", "Accelerometer")):
+        axes = [axis for axis in "xyz" if f"{quantity}_{axis}" not in analysed]
+        rejected = [axis for axis in axes if f"{quantity}_{axis}" in named]
+        absent = [axis for axis in axes if axis not in rejected]
+        for some, why in ((absent, "not in the log"), (rejected, "not analysed; see the findings")):
+            if some:
+                which = "" if len(some) == 3 else f" {join_names(some)}"
+                texts.append(f"{name}{which}: {why}.")
+    return texts
 
 
 def longer_log_text(times: Mapping[str, tuple[float, float]]) -> str:

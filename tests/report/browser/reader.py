@@ -11,7 +11,7 @@ from tests.report.browser.accessibility import UNFOLD
 Scheme = Literal["light", "dark"]
 READY = "document.documentElement.dataset.ready === 'yes'"
 SETTLED = """() => [...document.querySelectorAll("figure[data-kind]:not([data-drawn])")]
-  .every((one) => one.closest("section.channel[hidden]")
+  .every((one) => one.closest("section.channel[hidden], details:not([open])")
     || one.getBoundingClientRect().top > innerHeight + 250
     || one.getBoundingClientRect().bottom < -250)"""
 _TRACES = """canvas => canvas.data.map(({type, mode, name, x, y, width, fill, fillcolor, text,
@@ -41,6 +41,9 @@ CUT_CAPTIONS = """() => [...document.querySelectorAll(".scroll caption")].filter
 OPEN_TAB = """figure => {
   const panel = figure.closest("section.channel[hidden]");
   if (panel) document.querySelector(`[role=tab][aria-controls="${panel.id}"]`).click();
+  for (let one = figure.closest("details"); one; one = one.parentElement.closest("details")) {
+    one.open = true;
+  }
 }"""
 
 

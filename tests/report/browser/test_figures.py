@@ -276,38 +276,37 @@ def test_the_spectrum(night: Reader, bench: Report) -> None:
 
 
 @pytest.mark.release
-def test_samples_over_time_with_findings_and_temperature(night: Reader) -> None:
-    figure = night.figure("series", channel="gyro_x")
-    low, high, mean, drift, warmth = traces(figure)
-    bias = 0.2  # °/s
-    assert np.mean(mean["y"]) == pytest.approx(bias, rel=0.02)
-    assert all(a <= m <= b for a, m, b in zip(low["y"], mean["y"], high["y"], strict=True))
-    # What it is drawn in is a power of ten of the unit.
-    power = np.ptp(drift["y"]) / np.ptp(mean["y"])
-    assert math.log10(power) == pytest.approx(round(math.log10(power)))
-    left = np.subtract(mean["y"], np.mean(mean["y"]))
-    np.testing.assert_allclose(np.divide(drift["y"], power), left, atol=1e-9)
+def test_the_log_over_time_with_its_events_and_temperature(night: Reader) -> None:
+    figure = night.figure("timeline")
+    drawn = traces(figure)
+    mean = only(drawn, name="gyro x")
+    assert abs(np.mean(mean["y"])) < 1e-6  # less the mean of the log
+    warmth = only(drawn, name="temperature")
     minutes = made.SAMPLES / made.RATE / 60
     assert (mean["x"][0], mean["x"][-1]) == pytest.approx((0.0, minutes), abs=minutes / 400)
     assert axis_title(figure, "x") == "time (min)"
     assert (warmth["y"][0], warmth["y"][-1]) == pytest.approx((20.0, 35.0), abs=0.1)
-    shapes = "canvas => (canvas.layout.shapes ?? []).map(one => [one.x0, one.x1])"
     canvas = figure.locator(".canvas")
-    assert canvas.evaluate(shapes) == [[5.0, 7.0]]
-    numbers = canvas.evaluate("canvas => canvas.layout.annotations.map(one => one.text)")
-    table = figure.page.get_by_role("table", name="Warnings")
-    assert (
-        table.get_by_role("row").filter(has_text="was moved").locator("th").inner_text() in numbers
-    )
-    toggle(figure, "findings").uncheck()
-    assert canvas.evaluate(shapes) == []
-    toggle(figure, "temperature").uncheck()
-    assert len(traces(figure)) == 4 and figure.locator("svg .y3title").count() == 0
-    layer = "drift: the mean alone, less that of the whole log"
-    toggle(figure, layer).uncheck()
-    assert len(traces(figure)) == 3 and figure.locator("svg .y2title").count() == 0
-    for label in ("findings", "temperature", layer):
-        toggle(figure, label).check()
+    assert canvas.evaluate("canvas => canvas.layout.shapes.map(one => [one.x0, one.x1])") == [
+        [5.0, 7.0]
+    ]
+    whole = canvas.evaluate("canvas => canvas.layout.xaxis.range")
+    figure.get_by_role("button", name=re.compile("step")).press("Enter")
+    low, high = canvas.evaluate("canvas => canvas.layout.xaxis.range")
+    assert (low, high) == pytest.approx((3.0, 9.0))
+    assert "was moved" in figure.get_by_role("status").inner_text()
+    figure.get_by_role("button", name="all", exact=True).click()
+    assert canvas.evaluate("canvas => canvas.layout.xaxis.range") == pytest.approx(whole)
+    assert figure.get_by_role("status").inner_text() == ""
+
+
+@pytest.mark.release
+def test_bias_over_time_and_against_temperature(night: Reader) -> None:
+    (over_time,) = traces(night.figure("bias", channel="gyro_x", over="time"))
+    assert np.mean(over_time["y"]) == pytest.approx(0.2, rel=0.02)  # °/s
+    (warm,) = traces(night.figure("bias", channel="gyro_x", over="temperature"))
+    np.testing.assert_allclose(warm["y"], over_time["y"])
+    assert (min(warm["x"]), max(warm["x"])) == pytest.approx((20.0, 35.0), abs=0.1)
 
 
 @pytest.mark.release
@@ -417,7 +416,7 @@ def test_the_units_of_the_figures_follow_the_reader(
     for choice in choices:
         units = FACTORS["gyro"][choice]
         reader.page.get_by_label("Gyroscopes in").select_option(choice)
-        for kind, symbol in (("allan", "adev"), ("spectrum", "psd"), ("series", "signal")):
+        for kind, symbol in (("allan", "adev"), ("spectrum", "psd"), ("bias", "signal")):
             figure = reader.figure(kind, channel="gyro_x")
             assert f"({units[symbol][0]})" in axis_title(figure, "y")
         measured = only(traces(reader.figure("allan", channel="gyro_x")), mode="lines+markers")

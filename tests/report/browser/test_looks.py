@@ -162,6 +162,7 @@ def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
 
 def test_the_first_column_of_a_table_stays_in_view(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT, width=768)
+    reader.page.get_by_text("All methods").first.click()
     table = reader.page.get_by_role("region", name="parameters by method").first
     assert table.evaluate("one => one.scrollWidth - one.clientWidth") > 100
     table.evaluate("one => { one.scrollLeft = 100; }")

@@ -8,6 +8,7 @@ import pytest
 from imubench_pipeline.words.numbers import count_digits, digit_limits, number_text
 from tests.conftest import few
 from tests.report.browser import made
+from tests.report.browser.accessibility import UNFOLD
 from tests.report.browser.factors import FACTORS
 from tests.report.browser.made import Report
 from tests.report.browser.reader import READY, Open, Reader, axis_title
@@ -96,6 +97,7 @@ def test_numbers_and_units_follow_the_reader(path: str, read: Open, bench: Repor
 
 def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
+    reader.page.evaluate(UNFOLD)
     used = reader.page.get_by_role("table", name="Parameters by method").first.locator(
         "tr.recommended"
     )
@@ -134,6 +136,7 @@ def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
 
 def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
+    reader.page.evaluate(UNFOLD)
     reader.page.get_by_role("button", name="all channels").click()
     tables = reader.page.get_by_role("table", name="Parameters by method")
     # Without a random walk the curve falls on: it has no lowest point.

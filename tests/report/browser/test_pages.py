@@ -65,7 +65,9 @@ def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:
     offered = {path: page["offered"] for path, page in seen.pages.items()}
     assert seen.figures.items() <= offered.items()
     night = seen.figures[f"recordings/alpha/{made.NIGHT.recording}.html"]
-    assert night == 3 * len(("allan", "spectrum", "series", "histogram")) + 1  # of its errors
+    of_channel = ("spectrum", "bias over time", "bias against temperature", "allan", "histogram")
+    # Of the triads, of the log over time, and of its errors
+    assert night == 3 * len(of_channel) + 2 + 1 + 1
     assert offered["index.html"] == 1 + len(FOREST)
     assert offered["sensors/gamma.html"] == offered["recordings/gamma/only.html"] == 0
     followed = {(row["channel"], row["parameter"]) for row in bench.rows["drift"]}

@@ -25,8 +25,8 @@ def test_tabs_of_a_recording(read: Open, bench: Report) -> None:
         "one => one === document.activeElement"
     )
     assert page.url.endswith("#channel=gyro_y")
-    # A finding leads to its channel, wherever that stands.
-    page.get_by_role("table", name="Warnings").get_by_role("link", name="gyro x").click()
+    # The values of an axis lead to its channel.
+    page.get_by_role("table", name="Gyroscope").first.get_by_role("link", name="x").click()
     assert page.evaluate(VISIBLE) == ["gyro_x"]
     page.get_by_role("button", name="all channels").click()
     assert page.evaluate(VISIBLE) == ["gyro_x", "gyro_y", "accel_x"]

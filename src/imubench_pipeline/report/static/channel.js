@@ -43,7 +43,7 @@ kinds.axes = (figure) => {
       over: [
         curveOf(view, unit, view.channel.replace("_", " "), { group: view.channel, mode: "markers", marker: { color: colour, symbol: look.marker, size: 5 } }),
         ...(best ? [line(array(best[0]), scaled(best[1], unit.factor), { ...look, width: 2 }, { group: [view.channel, "model"], name: `${view.channel.replace("_", " ")}, model` })] : []),
-        ...printedOf(view).map((printed) => line(array(view.tau), printedLine(printed, array(view.tau), unit), { ...MARKED, dash: "dot", width: 1.4 }, {
+        ...printedOf(view).filter(({ label }) => views.find((other) => printedOf(other).some((one) => one.label === label)) === view).map((printed) => line(array(view.tau), printedLine(printed, array(view.tau), unit), { ...MARKED, dash: "dot", width: 1.4 }, {
           group: [view.channel, "datasheet"], hoverinfo: "name", name: `datasheet: ${printed.label}`, meta: { guide: true },
         })),
       ],
@@ -124,10 +124,8 @@ kinds.allan = (figure) => {
     groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: sheet });
   });
   const ranges = { x: logRange(tau, 0.1), y: logRange(y, 0.7, 0.25) };
-  const slopes = slopeGuides(ranges.x, ranges.y);
-  groups.push({ key: "slopes", label: "slopes", on: true, look: { light: inks().soft, dark: inks().soft } });
   const axes = { xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y) };
-  return { traces, groups, layout: { ...axes, ...(shown(figure, "slopes") ? slopes : {}) } };
+  return { traces, groups, layout: axes };
 };
 
 kinds.spectrum = (figure) => {
@@ -151,18 +149,21 @@ kinds.spectrum = (figure) => {
   const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", colourOf(own), own.marker)];
   const groups = [
     { key: "used", label: "bins used", on: true, look: { ...own, line: false } },
-    { key: "left", label: "bins excluded", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
+    { key: "left", label: "bins excluded", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0, more: true },
   ];
   const [least, most] = ["lower", "upper"].map((of) => scaled(spectrum[of], unit.factor));
   traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2, { group: "scatter" }));
   traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit", name: `fit ${spectrum.model}`, meta: { low: least, high: most } }));
   groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
-  groups.push({ key: "scatter", label: "95 % band of the bins if the model is right", on: true, look: { ...look, marker: undefined, filled: true } });
+  groups.push({ key: "scatter", label: "95 % band of the bins if the model is right", on: true, look: { ...look, marker: undefined, filled: true }, more: true });
   spectrum.terms.forEach((term, place) => {
     traces.push(line(array(spectrum.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
-    groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
+    groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place), more: true });
   });
   const range = logRange(density, 0.3);
+  const labels = [...spectrum.lines].sort((a, b) => b.amplitude - a.amplitude).slice(0, 6).map((each) => ({
+    x: each.frequency, y: 10 ** (range[1] - 0.05 * (range[1] - range[0])), text: `${numberText(each.frequency, 3)} Hz`, colour: colourOf(MARKED), group: "lines",
+  }));
   if (spectrum.lines.length > 0) {
     const own = { ...MARKED, dash: "dot", width: 1.2 };
     for (const each of spectrum.lines) {
@@ -173,7 +174,7 @@ kinds.spectrum = (figure) => {
     groups.push({ key: "lines", label: spectrum.lines.length === 1 ? "line" : "lines", on: true, look: own });
   }
   const layout = { xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)), yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range) };
-  return { traces, groups, layout };
+  return { traces, groups, labels, layout };
 };
 
 function timeScale(longest) {
@@ -181,73 +182,92 @@ function timeScale(longest) {
   return { size: 1, name: "s" };
 }
 
-kinds.series = (figure) => {
-  const channel = figure.dataset.channel;
-  const envelope = pageData.samples.envelope[channel];
-  const warmth = pageData.samples.envelope.temperature;
-  const unit = unitOf(quantityOf(channel), "signal");
-  const scale = timeScale(envelope.end);
-  const middle = (of) => array(of.mean).map((_, i, every) => (of.start + ((i + 0.5) * (of.end - of.start)) / every.length) / scale.size);
-  const x = middle(envelope);
-  const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" };
-  const [low, high, mean] = ["low", "high", "mean"].map((name) => scaled(envelope[name], unit.factor));
-  const traces = band(x, low, high, look, 0.35, { group: "envelope" });
-  const whole = mean.filter(Number.isFinite).reduce((sum, each, _, all) => sum + each / all.length, 0);
-  traces.push({
-    ...line(x, mean, black()), group: "mean", hoverinfo: "text", name: "mean", meta: { low, high },
-    text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: mean ${numberText(mean[i], 4)} ${unit.sign}<br>${interval(low[i], high[i])} ${unit.sign}`),
+const middles = (of, size) => array(of.mean).map((_, i, every) => (of.start + ((i + 0.5) * (of.end - of.start)) / every.length) / size);
+const meanOf = (values) => values.filter(Number.isFinite).reduce((sum, each, _, all) => sum + each / all.length, 0);
+const WARM = { light: "#D55E00", dark: "#F08A3C", dash: "solid" };
+
+// The whole log: smallest and largest samples, temperature, and the findings with their times.
+kinds.timeline = (figure) => {
+  const { temperature, ...envelopes } = pageData.samples.envelope;
+  const names = Object.keys(envelopes);
+  const scale = timeScale(envelopes[names[0]].end);
+  const [traces, groups] = [[], []];
+  const layout = { xaxis: linearAxis(`time (${scale.name})`), margin: { l: 60, r: 14, t: 24, b: 50 } };
+  const panels = [...new Set(names.map(quantityOf)), ...(temperature ? ["temperature"] : [])];
+  panels.forEach((panel, place) => {
+    const yaxis = place === 0 ? "y" : `y${place + 1}`;
+    const unit = panel === "temperature" ? { sign: "°C" } : unitOf(panel, "signal");
+    const top = 1 - place / panels.length;
+    layout[yaxis.replace("y", "yaxis")] = { ...linearAxis(panel === "temperature" ? unit.sign : `${panel} (${unit.sign})`), nticks: 4, domain: [top - 1 / panels.length + (place === panels.length - 1 ? 0 : 0.05), top] };
+    if (panel === "temperature") return traces.push({ ...line(middles(temperature, scale.size), array(temperature.mean), WARM), name: "temperature", meta: { of: "°C" }, yaxis, hoverinfo: "x+y" });
+    for (const name of names.filter((each) => quantityOf(each) === panel)) {
+      const [low, high, mean] = ["low", "high", "mean"].map((of) => scaled(envelopes[name][of], unit.factor));
+      const whole = meanOf(mean);
+      const [x, look, text] = [middles(envelopes[name], scale.size), AXIS_LOOKS[name.split("_")[1]] ?? sensorLook(), name.replace("_", " ")];
+      const less = (values) => values.map((each) => each - whole);
+      traces.push(...band(x, less(low), less(high), look, 0.3, { group: name, yaxis }), {
+        ...line(x, less(mean), { ...look, width: 1 }), group: name, name: text, yaxis, meta: { low: less(low), high: less(high) }, hoverinfo: "text",
+        text: x.map((t, i) => `${text}, ${numberText(t, 4)} ${scale.name}<br>${interval(low[i], high[i])} ${unit.sign}`),
+      });
+      groups.push({ key: name, label: text, on: true, look: { ...look, marker: undefined } });
+    }
   });
-  const groups = [
-    { key: "envelope", label: "smallest and largest sample", on: true, look: { ...look, filled: true } },
-    { key: "mean", label: "mean", on: true, look: black() },
-    { key: "drift", label: "drift of the mean", on: true, look: { ...look, width: 2 } },
-  ];
-  const layout = { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) };
-  const below = []; // panels below the samples
-  const panel = (title) => {
-    const name = `y${below.length + 2}`;
-    below.push(name);
-    layout[name.replace("y", "yaxis")] = { ...linearAxis(title), nticks: 4 };
-    return name;
+  layout.xaxis.anchor = panels.length > 1 ? `y${panels.length}` : "y";
+  const events = pageData.findings.filter(({ spans }) => spans.length > 0);
+  const { mark } = inks();
+  layout.shapes = events.flatMap(({ finding, spans }) => (finding === "knocks" ? [[Math.min(...spans.flat()), Math.max(...spans.flat())]] : spans).map(([start, end]) => ({
+    type: "rect", xref: "x", yref: "paper", y0: 0, y1: 1, x0: start / scale.size, x1: end / scale.size, fillcolor: faint(mark, 0.12), line: { color: mark, width: 1, dash: "dot" }, layer: "below",
+  })));
+  // A number beside an earlier one would cover it; the list of events has all.
+  const near = (16 / Math.max(figure.clientWidth - 80, 200)) * (envelopes[names[0]].end / scale.size);
+  const placed = [];
+  for (const { number, spans } of events) {
+    const x = spans[0][0] / scale.size;
+    if (placed.some((other) => Math.abs(other.x - x) < near)) continue;
+    placed.push({ x, xref: "x", yref: "paper", y: 1, yanchor: "bottom", xanchor: "center", text: `${number}`, showarrow: false, captureevents: true, font: { color: mark, size: 12 } });
+  }
+  return { traces, groups, height: 80 + 110 * panels.length, layout: { ...layout, annotations: placed } };
+};
+
+// Buttons for the events of the log: each zooms to its time and shows its text.
+kinds.timeline.started = (figure, canvas) => {
+  const events = pageData.findings.filter(({ spans }) => spans.length > 0);
+  if (events.length === 0) return;
+  const said = element("p", { className: "event" });
+  said.setAttribute("role", "status");
+  const show = (event) => {
+    const { size } = timeScale(Object.values(pageData.samples.envelope)[0].end);
+    const ends = event ? [Math.min(...event.spans.flat()), Math.max(...event.spans.flat())] : null;
+    const room = ends && Math.max(ends[1] - ends[0], 0.02 * Object.values(pageData.samples.envelope)[0].end);
+    zooms.set(figure, event ? { xaxis: { range: [(ends[0] - room) / size, (ends[1] + room) / size], title: canvas.layout.xaxis.title.text } } : {});
+    said.textContent = event ? `${event.number}. ${event.channel ? `${event.channel}: ` : ""}${event.detail}` : "";
+    bar.querySelectorAll("button").forEach((button) => button.setAttribute("aria-pressed", String(button.value === String(event?.number ?? "all"))));
+    drawFigure(figure);
   };
-  if (shown(figure, "drift")) {
-    const step = 10 ** Math.floor(Math.log10(Math.max(...mean.map((each) => Math.abs(each - whole)).filter(Number.isFinite), 1e-300)) + 0.3);
-    const [small, power] = step < 1e-2 ? [step, `${powerText(Math.round(Math.log10(step)))} `] : [1, ""];
-    traces.push({
-      ...line(x, mean.map((each) => (each - whole) / small), { ...look, width: 1.4 }), group: "drift", name: "drift", meta: { of: `drift (${power}${unit.sign})` }, yaxis: panel(`drift (${power}${unit.sign})`), hoverinfo: "text",
-      text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: ${numberText(mean[i] - whole, 3)} ${unit.sign} from the mean`),
-    });
+  const button = (value, text, event) => element("button", { type: "button", value, textContent: text, onclick: () => show(event) });
+  const bar = element("div", { className: "events on-screen" }, button("all", "all", null), ...events.map((event) => button(`${event.number}`, `${event.number} ${event.finding.replaceAll("_", " ")}`, event)));
+  canvas.on("plotly_clickannotation", ({ annotation }) => show(events.find(({ number }) => `${number}` === annotation.text)));
+  canvas.before(bar, said);
+};
+
+// The mean of the samples of a channel over time or against temperature.
+kinds.bias = (figure) => {
+  const { channel, over } = figure.dataset;
+  const { [channel]: own, temperature } = pageData.samples.envelope;
+  const unit = unitOf(quantityOf(channel), "signal");
+  const scale = timeScale(own.end);
+  const y = scaled(own.mean, unit.factor);
+  const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" };
+  const yaxis = linearAxis(`${channel.replace("_", " ")} (${unit.sign})`);
+  if (over === "time") {
+    return { traces: [{ ...line(middles(own, scale.size), y, { ...look, width: 1.4 }), name: "mean", hoverinfo: "x+y" }], groups: [], layout: { xaxis: linearAxis(`time (${scale.name})`), yaxis } };
   }
-  if (warmth) {
-    const warm = { light: "#D55E00", dark: "#F08A3C", dash: "solid" };
-    groups.push({ key: "temperature", label: "temperature", on: true, look: warm });
-    if (shown(figure, "temperature")) {
-      traces.push({ ...line(middle(warmth), array(warmth.mean), warm), group: "temperature", name: "temperature", meta: { of: "°C" }, yaxis: panel("°C"), hoverinfo: "x+y" });
-    }
-  }
-  const share = below.length === 0 ? 0 : below.length === 1 ? 0.36 : 0.52;
-  layout.yaxis.domain = [share, 1];
-  below.forEach((name, place) => {
-    const top = share * (1 - place / below.length) - 0.07;
-    layout[name.replace("y", "yaxis")].domain = [top - share / below.length + 0.07 + (place === below.length - 1 ? 0 : 0.03), top].map((end) => Math.max(end, 0));
+  const warm = array(temperature.mean);
+  const x = y.map((_, i) => {
+    const time = own.start + ((i + 0.5) * (own.end - own.start)) / y.length;
+    return warm[Math.min(warm.length - 1, Math.max(0, Math.floor(((time - temperature.start) / (temperature.end - temperature.start)) * warm.length)))];
   });
-  if (below.length > 0) layout.xaxis.anchor = below.at(-1);
-  const marked = pageData.findings.filter((finding) => finding.start !== null && (finding.channel === null || finding.channel === channel));
-  if (marked.length > 0) {
-    groups.push({ key: "findings", label: "findings", on: true, look: { ...MARKED, filled: true } });
-    if (shown(figure, "findings")) {
-      // Knocks are single events, so only the range from the first to the last is marked.
-      layout.shapes = marked.map((finding) => ({
-        type: "rect", xref: "x", yref: "paper", y0: finding.finding === "knocks" ? 0.97 : 0, y1: 1, x0: finding.start / scale.size, x1: (finding.end ?? finding.start) / scale.size,
-        fillcolor: faint(inks().mark, 0.13), line: { color: inks().mark, width: 1, dash: "dot" }, layer: "below",
-      }));
-      layout.annotations = marked.map((finding, i) => ({
-        xref: "x", yref: "paper", x: finding.start / scale.size, y: 1 - 0.06 * (i % 4), text: `${finding.number}`, showarrow: false,
-        font: { color: inks().mark, size: 12 }, bgcolor: inks().paper, borderpad: 1, xanchor: "left", yanchor: "top",
-      }));
-    }
-  }
-  return { traces, groups, layout };
+  return { traces: [{ type: "scatter", mode: "markers", x, y, name: "mean", hoverinfo: "x+y", marker: { color: colourOf(look), size: 4 } }], groups: [], layout: { xaxis: linearAxis("temperature (°C)"), yaxis } };
 };
 
 kinds.compared = (figure) => {
