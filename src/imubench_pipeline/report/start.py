@@ -70,6 +70,7 @@ class Cell:
     margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
     other_margins: str  # of noise alone, and the likely one
     bar: tuple[float, float, float] | None  # of the margin and its limits, the places
+    noise: float | None  # of the margin of noise alone, the place
     weak: str  # reasons for weak evidence
     doubts: str  # doubts about the recordings
     reason: str  # why it is not judged
@@ -94,7 +95,6 @@ class Column:
     name: str
     title: str
     limits: Sequence[str]
-    answer: str
 
     @property
     def short(self) -> str:
@@ -106,6 +106,7 @@ class Column:
 class Matrix:
     """All sensors and requirements."""
 
+    answer: str  # the sensors to choose
     columns: Sequence[Column]
     lines: Sequence[tuple[str, Sequence[Cell]]]  # by sensor, the best first
     apart: Mapping[str, str]  # sensors that are not compared, and why
@@ -122,6 +123,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
     drawn: list[float | None] = []
     for deciding in rows.values():
         drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
+        drawn += [deciding.noise_margin]
         drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
@@ -141,20 +143,20 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         counts = [-met[verdict] for verdict in _VERDICTS]
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
 
-    columns = []
+    columns, best = [], {}
     for place, (name, declared) in enumerate(requirements.items()):
         cells = [cells[place] for cells in lines.values()]
-        judged = sorted((cell for cell in cells if cell.margin), key=lambda cell: -cell.order)
-        best = [rows[name, cell.sensor] for cell in judged]
-        excluded = sum(cell.verdict == "excluded" for cell in cells)
-        answer = verdicts.answer_text(best, site.names, len(cells), excluded)
+        judged = [cell for cell in cells if cell.margin]
+        first = max(judged, key=lambda cell: cell.order, default=None)
         requirement = Requirement.model_validate(declared)
         limits = [
             f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
             for x in requirement.limits
         ]
-        columns.append(Column(name, requirement.title, limits, answer))
+        columns.append(Column(name, requirement.title, limits))
+        best[columns[-1].short] = rows[name, first.sensor] if first else None
     return Matrix(
+        verdicts.summary_text(best, site.names),
         columns,
         sorted(lines.items(), key=lambda line: order(line[0])),
         apart,
@@ -178,7 +180,8 @@ def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is not ranked."""
     reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
     verdict: Verdict = "not_enough_data"
-    return Cell(requirement, sensor, verdict, 0, None, "", None, "", "", reason, (), -math.inf)
+    unknown = (None, "", None, None, "", "")
+    return Cell(requirement, sensor, verdict, 0, *unknown, reason, (), -math.inf)
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
@@ -216,6 +219,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         format_margin(row) if judged else None,
         verdicts.other_margins_text(row) if judged else "",
         bar,
+        scale.place(row.noise_margin) if judged and row.noise_margin is not None else None,
         verdicts.evidence_text(row) if judged else "",
         verdicts.used_doubts_text(row),
         reason,

@@ -55,9 +55,9 @@ def counted(number: int, singular: str, plural: str | None = None) -> str:
     return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
-def join_names(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str], by: str = "and") -> str:
     """Return names as a list in a sentence: ``x, y and z``."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+    return f" {by} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def digit_limits(parameter: str = "") -> tuple[int, int]:

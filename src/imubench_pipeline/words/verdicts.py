@@ -420,6 +420,36 @@ def answer_text(
     return f"{text}. {rank}{f' (weak evidence: {weak})' if weak else ''}."
 
 
+def summary_text(
+    best: Mapping[str, comparisons.RankingRow | None], names: Mapping[str, str]
+) -> str:
+    """Return the recommended sensors for all requirements in one sentence.
+
+    ``best`` is the deciding row of the best judged sensor by the name of the requirement in words,
+    None without one; ``names`` are the sensors in words.
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for requirement, row in best.items():
+        name = names[row.sensor] if row else "No sensor"
+        if row is None:
+            key = "No sensor can be judged for", ""
+        elif row.verdict in ("meets", "likely_meets"):
+            key = f"{name} {SHORT_VERDICTS[row.verdict]}", ""
+        elif row.verdict == "meets_if":
+            number = len(row.conditions)
+            end = f" if {counted(number, 'unknown figure')} {'is' if number == 1 else 'are'}"
+            key = f"{name} meets", f"{end} good enough"
+        elif row.verdict in ("fails", "cannot_meet"):
+            key = "No sensor meets", ""
+        else:
+            key = "No sensor is shown to meet", ""
+        groups.setdefault(key, []).append(requirement)
+    return " ".join(
+        f"{of} {join_names(which, 'or' if of.startswith('No sensor') else 'and')}{end}."
+        for (of, end), which in groups.items()
+    )
+
+
 _HEADINGS: Mapping[Verdict, str] = {
     "meets": "Also meet the limits",
     "likely_meets": "Likely meet the limits",
