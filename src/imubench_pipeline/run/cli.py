@@ -22,6 +22,7 @@ from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import calibrate_command as calibration
 from imubench_pipeline.run import convert_command as conversion
+from imubench_pipeline.run import demo_command as demo
 from imubench_pipeline.run import export_command as exports
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
@@ -320,6 +321,16 @@ COMMANDS = {
         calibration.add_arguments,
         calibration.run,
         ("written", "", "a log cannot be used, or is incomplete, or the program cannot hold it"),
+    ),
+    "demo": command_line.Command(
+        "compare simulated sensors, or analyse a published log of a real one",
+        demo.add_arguments,
+        demo.run,
+        (
+            "done (exit status of snakemake), or printed",
+            "a step failed, or the log was rejected",
+            "the folder or the file is not as expected",
+        ),
     ),
     "init": command_line.Command(
         "make a folder of logs",
