@@ -95,7 +95,7 @@ def describe(log: RealLog, folder: Path) -> str:
             f"Licence: {log.licence}; not included in this package",
             f"Download ({log.size / 1e6:.1f} MB): {log.command}",
             f"SHA-256: {log.digest}",
-            f"Then: imubench demo {folder} --real {log.file}",
+            f"Then, with the extra hdf5: imubench demo {folder} --real {log.file}",
         ]
     )
 
