@@ -1,5 +1,7 @@
 """Puts workflow, catalogue and plotly.js into a wheel; all else is in pyproject.toml."""
 
+import re
+import tomllib
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -8,6 +10,24 @@ from setuptools.command.build_py import build_py
 
 PLOTTING = "plotly/package_data/plotly.min.js"
 SHIPPED = ("Snakefile", "workflow/**/*", "config/**/*", "profiles/**/*")
+_PICTURE = re.compile(r"!\[[^]]*\]\((?!\w+:)[^)]+\)\n\n(\*[^*]+\*\n\n)?")  # with its caption
+_LINK = re.compile(r"\[([^]]*)\]\((?!\w+:|#)([^)]+)\)")
+
+
+def describe(readme: str, files: str | None) -> str:
+    """Return the README for a package index, with relative links below an address.
+
+    Without an address, links become text, and pictures and their captions are left out.
+    """
+    if files is None:
+        return _LINK.sub(r"\1", _PICTURE.sub("", readme))
+    return _LINK.sub(rf"[\1]({files.rstrip('/')}/\2)", readme)
+
+
+def read_description() -> str:
+    """Return the README of this project with the address of its files in pyproject.toml."""
+    project = tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["project"]
+    return describe(Path("README.md").read_text("utf-8"), project.get("urls", {}).get("Files"))
 
 
 class WithProject(build_py):
@@ -57,4 +77,9 @@ class WithProject(build_py):
         }
 
 
-setup(cmdclass={"build_py": WithProject})
+if __name__ == "__main__":
+    setup(
+        cmdclass={"build_py": WithProject},
+        long_description=read_description(),
+        long_description_content_type="text/markdown",
+    )

@@ -20,8 +20,21 @@ for row in pq.read_table(tables / "parameters.parquet").to_pylist():
     if abs(error) > 0.02:
         sys.exit("N is more than 2 % off")
     checked += 1
-if checked != 14:
-    sys.exit(f"{checked} channels, expected 14")
+if checked != 38:
+    sys.exit(f"{checked} channels, expected 38")
+
+# Each requirement compares: it judges four sensors or more, some meet its limits and some do not.
+MEET = {"meets", "likely_meets", "meets_if"}
+FAIL = {"fails", "likely_fails", "cannot_meet"}
+verdicts: dict[str, dict[str, str]] = {}
+for row in pq.read_table(tables / "ranking.parquet").to_pylist():
+    if row["decides"]:
+        verdicts.setdefault(row["requirement"], {})[row["sensor"]] = row["verdict"]
+for requirement, of_sensors in verdicts.items():
+    judged = {name: verdict for name, verdict in of_sensors.items() if verdict in MEET | FAIL}
+    print(f"{requirement:16} {len(judged)} judged: {judged}")
+    if len(judged) < 4 or not MEET & {*judged.values()} or not FAIL & {*judged.values()}:
+        sys.exit(f"{requirement} compares too little: {of_sensors}")
 
 # A filter of the drives that has the true model is as sure as it says. The errors of the other
 # sensors grow beyond what a linearised filter can tell, and their rows say so.

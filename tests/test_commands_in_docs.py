@@ -48,6 +48,9 @@ ELSEWHERE = {
     ".venv-test/bin/sphinx-build -W -q docs docs/_build/html": INSTALLS,
     ".venv/bin/pip install -r requirements/docs.txt && .venv/bin/sphinx-build -W -q docs "
     "docs/_build/html": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install '.[workflow]'": INSTALLS,
+    "python3 -m venv .venv && .venv/bin/pip install '.[workflow]' && .venv/bin/imubench analyse "
+    "run.csv --output run": INSTALLS,
     'python3 -m venv .venv && .venv/bin/pip install "$(echo imubench_pipeline-*.whl)[workflow]"': (
         OF_A_WHEEL
     ),

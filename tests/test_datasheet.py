@@ -372,6 +372,19 @@ def test_an_allan_deviation_is_compared_at_its_averaging_time() -> None:
     assert row.verdict == "not measured"
 
 
+def test_a_correlation_time_with_the_limit_0_leaves_the_other_terms_at_that_end() -> None:
+    printed = {"value": 0.5, "unit": "deg/h", "tau": "600 s"}
+    parameters = {
+        "N": Parameter(1e-4, lower=9e-5, upper=1.1e-4),
+        "B": Parameter(1e-5, lower=9e-6, upper=1.1e-5),
+        "T_B": Parameter(None, "not_identified", lower=0.0, upper=1000.0, fitted=100.0),
+    }
+    found = estimate()
+    known = replace(found, parameters={**found.parameters, **parameters})
+    row = next(r for r in all_rows(sheet(allan_deviation=printed), known) if r.printed)
+    assert row.lower == pytest.approx(9e-5 / math.sqrt(600.0))
+
+
 def test_minimum_and_plateau_have_the_limits_of_the_curve() -> None:
     known = estimate(N=1e-4, B=7e-5, T_B=100.0, K=3e-6)
     curve = {

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -148,3 +150,16 @@ def test_where_there_is_no_posix_it_says_so_at_once() -> None:
         check=False,
     )
     assert done.returncode == 2 and "expected Linux" in done.stderr and "WSL" in done.stderr
+
+
+@pytest.mark.parametrize("files", [None, "https://example.org/raw/v1/"])
+def test_the_description_for_an_index_has_no_relative_link(files: str | None) -> None:
+    readme = (PROJECT / "README.md").read_text("utf-8")
+    described = runpy.run_path(str(PROJECT / "setup.py"))["describe"](readme, files)
+    links = re.findall(r"\]\(([^)]+)\)", described)
+    assert all(link.startswith("https://") for link in links)
+    if files is None:
+        assert "![" not in described and "the tutorial" in described.lower()
+    else:
+        assert "![" in described and f"{files}docs/images/report.png" in links
+        assert len(links) == len(re.findall(r"\]\(([^)]+)\)", readme))

@@ -7,6 +7,8 @@ import pytest
 from imubench_pipeline.readers import read
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, read_simulated
+from imubench_pipeline.simulate.from_datasheet import from_datasheet
+from imubench_pipeline.simulate.models import make_axis_model
 from imubench_pipeline.steps.simulate import write_simulated
 from tests.conftest import PROJECT, catalogue
 
@@ -69,10 +71,35 @@ def test_the_reader_of_a_layout_reads_what_is_written(log: dict[str, Any], tmp_p
     assert accel.mean() == pytest.approx(9.80665, abs=0.5)
 
 
+OPTIONS = {"stim300": "10 g", "mti_3": "later data sheets"}
+"""Of which model or revision the simulated figures are, where its sensor file leaves it open."""
+
+
+def test_those_of_data_sheets_are_typical_on_axis_y_and_a_tenth_off_on_the_others() -> None:
+    sensors = catalogue()
+    shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
+    simulated = [entry for entry in shipped if entry.recording == "sim_data_sheet"]
+    assert len(simulated) == 4
+    for entry in simulated:
+        sensor = sensors[entry.sensor]
+        if entry.sensor in OPTIONS:
+            sheet = sensor.datasheet.model_copy(update={"options": (OPTIONS[entry.sensor],)})
+            sensor = sensor.model_copy(update={"datasheet": sheet})
+        printed = from_datasheet(entry.sensor, sensor, 1).imu.axes
+        assert {*entry.channels} == {*printed}
+        for name, settings in entry.channels.items():
+            factor = {"x": 0.9, "y": 1.0, "z": 1.1}[name[-1]]
+            expected = printed[name].noise
+            noise = make_axis_model(settings, name).noise
+            assert noise.N == pytest.approx(factor * expected.N, rel=1e-3)
+            assert noise.B == pytest.approx(factor * expected.B, rel=1e-3)
+            assert (noise.T_B, noise.K) == (expected.T_B, expected.K) == (None, 0.0)
+
+
 def test_the_shipped_ones_can_all_be_written() -> None:
     sensors = catalogue()
     shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
-    assert len(shipped) == 14
-    assert all(sensors[entry.sensor].log.reader == "csv" for entry in shipped)
+    assert len(shipped) == 18
+    assert all(sensors[entry.sensor].log.reader in (None, "csv") for entry in shipped)
     first = shipped[0].channels["gyro_x"].si("gyro_x")
     assert first == {"N": 8.4e-5, "B": 6.7e-5, "T_B": 89.5, "K": 8.2e-7}

@@ -1,8 +1,8 @@
-"""Take the picture of the README: the first screen of a report, with its decision matrix.
+"""Take the pictures of the README: the page of one log, and the first screen of a report.
 
-    python docs/images/take.py results    (of the demonstration; with what `test` installs)
+    python docs/images/take.py bench results    (of the tutorial, and of the demonstration)
 
-The colours are reduced to 256.
+It needs what `test` installs. The colours are reduced to 256.
 """
 
 from __future__ import annotations
@@ -19,22 +19,26 @@ from playwright.sync_api import sync_playwright
 WIDTH = 1080
 
 
-def main(results: Path) -> None:
-    """Write `report.png` beside this file."""
+def main(one_log: Path, results: Path) -> None:
+    """Write `one_log.png` and `report.png` beside this file."""
     browser = os.environ.get("PLAYWRIGHT_CHROMIUM") or shutil.which("chromium")
+    pictures = {
+        "one_log.png": (one_log / "report.html", "figure .plot-container"),
+        "report.png": (results / "report/index.html", "#next-steps + ol"),
+    }
     with sync_playwright() as driver:
         opened = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
-        page = opened.new_page(viewport={"width": WIDTH, "height": 900})
-        page.goto((results / "report/index.html").resolve().as_uri())
-        end = page.eval_on_selector(
-            "#next-steps + ol", "e => e.getBoundingClientRect().bottom + scrollY"
-        )
-        clip = {"x": 0, "y": 0, "width": WIDTH, "height": end + 12}
-        taken = Image.open(io.BytesIO(page.screenshot(full_page=True, clip=clip)))
+        for name, (shown, last) in pictures.items():
+            page = opened.new_page(viewport={"width": WIDTH, "height": 900})
+            page.goto(shown.resolve().as_uri())
+            page.wait_for_selector(last)
+            end = page.eval_on_selector(last, "e => e.getBoundingClientRect().bottom + scrollY")
+            clip = {"x": 0, "y": 0, "width": WIDTH, "height": end + 1}
+            taken = Image.open(io.BytesIO(page.screenshot(full_page=True, clip=clip)))
+            few = taken.convert("RGB").quantize(256, kmeans=2)
+            few.save(Path(__file__).with_name(name), optimize=True)
         opened.close()
-    few = taken.convert("RGB").quantize(256, kmeans=2)
-    few.save(Path(__file__).with_name("report.png"), optimize=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

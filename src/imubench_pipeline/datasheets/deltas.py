@@ -77,10 +77,14 @@ def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
         return
 
     def at(group: Mapping[str, Parameter], amplitudes: str, times: str) -> dict[str, Parameter]:
-        return {
+        found = {
             name: Parameter(getattr(p, times if name == "T_B" else amplitudes)) if p.in_model else p
             for name, p in group.items()
         }
+        if (time := found.get("T_B")) and time.value == 0.0:
+            # As T_B goes to 0, the Allan variance of the process does so too.
+            found |= {"B": Parameter(0.0), "T_B": Parameter(None, "absent")}
+        return found
 
     for ends in product(("lower", "upper"), repeat=2):
         first, *further = (at(group, *ends) for group in groups)

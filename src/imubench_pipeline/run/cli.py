@@ -21,6 +21,7 @@ from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import convert_command as conversion
+from imubench_pipeline.run import demo_command as demo
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import sensors_command as sensors
@@ -311,6 +312,16 @@ COMMANDS = {
             "analysed",
             "a log was rejected, or a step failed",
             "a log or the sensor file is missing, or incomplete",
+        ),
+    ),
+    "demo": command_line.Command(
+        "compare simulated sensors, or analyse a published log of a real one",
+        demo.add_arguments,
+        demo.run,
+        (
+            "done (exit status of snakemake), or printed",
+            "a step failed, or the log was rejected",
+            "the folder or the file is not as expected",
         ),
     ),
     "init": command_line.Command(
