@@ -14,6 +14,7 @@ async function openPage(main) {
   startTables(main);
   startTabs(main);
   startMatrices(main);
+  startRequirement(main);
   startChooser(main);
   startComparison(main);
   startFigures(main);
