@@ -244,6 +244,7 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     assert list(settings["sensors"]) == ["s"]
     assert set(settings["sensors"]["s"]) == {"vendor", "model", "price_class", "sold"}
     assert settings["requirements"]["robot"]["title"] == "a robot"
+    assert set(settings["models"]["sensors"]["s"]) == {"price_class", "abilities", "figures"}
     assert {"tau", "common"} <= set(settings["settings"]["fusion"])
     assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])
     site = make_site({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)

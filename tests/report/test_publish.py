@@ -45,7 +45,10 @@ from tests.report.tables import (
     site,
 )
 
-ASSETS = {f"assets/{name}" for name in ("report.css", "report.js", "search.js", "plotly.min.js")}
+ASSETS = {
+    f"assets/{name}"
+    for name in ("report.css", "report.js", "search.js", "models.js", "plotly.min.js")
+}
 OF_ALL = {"index.html", "recordings.html", "datasheets.html", "fusion.html"}
 ALWAYS = {"index.html", "recordings.html", "experiments.html", "theory.html", "made.html"}
 KEPT = {"pages.json", "settings.json"}

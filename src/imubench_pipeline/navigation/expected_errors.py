@@ -231,13 +231,10 @@ def list_error_rows(
         for quantity in _QUANTITIES
     }
 
-    def drawn_of(channel: str) -> list[AxisErrors]:
-        stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
-        models = uncertainty.draw_models(estimates[channel], draws, stream("budget"))
-        of_use = _draw_figures(axes[channel].figures, draws, stream("temperature of the budget"))
-        return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
-
-    drawn = {channel: drawn_of(channel) for channel in axes}
+    drawn = {
+        channel: draw_axis_errors(channel, estimates[channel], errors.figures, draws, seed)
+        for channel, errors in axes.items()
+    }
     for question in questions:
         unit = SI_UNITS[DIMENSIONS[question.error]]
         asked = ErrorBudgetRow.taken_from(question, **names, source="total", unit=unit)
@@ -342,6 +339,16 @@ def collect_axis_errors(
         for channel, estimate in estimates.items()
         if estimate.model.terms
     }
+
+
+def draw_axis_errors(
+    channel: str, estimate: Estimate, figures: in_use.Figures, draws: int, seed: int
+) -> list[AxisErrors]:
+    """Return error sources of a channel drawn from their uncertainty, in its own random stream."""
+    stream = partial(channel_rng, seed, repr(estimate.model), channel)
+    models = uncertainty.draw_models(estimate, draws, stream("budget"))
+    of_use = _draw_figures(figures, draws, stream("temperature of the budget"))
+    return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
 
 def select_channels(

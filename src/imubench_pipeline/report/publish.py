@@ -24,6 +24,7 @@ from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import find_term, read_glossary
+from imubench_pipeline.report.models import make_models
 from imubench_pipeline.report.pages import ENTRIES, list_pages, read_plotting_script
 from imubench_pipeline.report.palette import AXIS_STYLES, TERM_COLOURS
 from imubench_pipeline.report.practical import System, choose_page_unit, list_page_units
@@ -168,7 +169,8 @@ _PAGE_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (
     *("address", "numbers", "terms", "tables", "tools", "plot", "sketch", "overlay", "ratios"),
-    *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "card", "start"),
+    *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "requirement", "card"),
+    "start",
 )
 
 Progress = Callable[[str], None]
@@ -183,8 +185,11 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     """
     written = []
     # A page opened from disk may not read files, but it may run scripts.
-    search = {"assets/search.js": f"imubenchSearch({make_search_index(site)});\n"}
-    for path, content in (_make_assets() | search).items():
+    loaded = {
+        "assets/search.js": f"imubenchSearch({make_search_index(site)});\n",
+        "assets/models.js": f"imubenchModels({make_models(site)});\n",
+    }
+    for path, content in (_make_assets() | loaded).items():
         written += _put(folder, path, content)
     every = list(list_pages(site))
     keys = {page.path: page.key for page in every}
@@ -334,6 +339,7 @@ def render_one_file(site: Site) -> str:
         css=assets["assets/report.css"],
         scripts=[script.replace("</script", "<\\/script") for script in scripts],
         search=make_search_index(site).replace("<", "\\u003c"),
+        models=make_models(site).replace("<", "\\u003c"),
         site=site.shown(alone=True),
         path="index.html",
         root="",

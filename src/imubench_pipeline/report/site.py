@@ -256,13 +256,10 @@ class Site:
     @cached_property
     def common(self) -> str:
         """Digest of the common content of all pages: settings, names, code."""
-        return _make_digest(
-            self.settings,
-            self.names,
-            [entry.file for entry in self.existing],
-            self.code,
-            version(_PACKAGE),
-        )
+        # The models are a file of their own.
+        settings = {key: value for key, value in self.settings.items() if key != "models"}
+        files = [entry.file for entry in self.existing]
+        return _make_digest(settings, self.names, files, self.code, version(_PACKAGE))
 
     def key_of(self, *parts: object) -> str:
         """Return the digest of the content of a page."""

@@ -270,6 +270,7 @@ def _start(site: Site) -> Mapping[str, object]:
         "strip": summarise_counts(site),
         "about": " ".join(filter(None, (describe_dates(views), describe_simulated(views)))),
         "matrix": make_decision_matrix(site),
+        "interactive": "models" in site.settings,
         "failures": [
             {**row.columns(), "view": by_name.get((row.sensor, row.recording or ""))}
             for row in site.rows(FailureRow)

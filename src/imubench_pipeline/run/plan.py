@@ -359,15 +359,17 @@ class Plan:
 
     def ranking_settings(self) -> str:
         """Return the settings of the ranking: requirements, and sensors that are for sale."""
-        sensors = {
-            name: about
+        sensors = self._for_sale()
+        requirements = self._requirements("title", "note", "example")
+        return to_json({"requirements": requirements, "sensors": sensors})
+
+    def _for_sale(self) -> dict[str, dict[str, object]]:
+        """Return price class and properties of the sensors that are for sale."""
+        return {
+            name: about | {"abilities": read_abilities(self.sensors[name]).model_dump(mode="json")}
             for name, about in self._described("price_class").items()
             if self.sensors[name].sold
         }
-        for name, about in sensors.items():
-            about["abilities"] = read_abilities(self.sensors[name]).model_dump(mode="json")
-        requirements = self._requirements("title", "note", "example")
-        return to_json({"requirements": requirements, "sensors": sensors})
 
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return the requirements of applications, without keys that a step does not use."""
@@ -397,6 +399,13 @@ class Plan:
                 "sensors": self._described("vendor", "model", "price_class", "sold"),
                 "boards": {name: _describe_board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
+                "models": {
+                    "drawn": self.run.error_budget.model_dump(include={"draws", "seed"}),
+                    "sensors": {
+                        name: about | {"figures": state_figures(self.sensors[name])}
+                        for name, about in self._for_sale().items()
+                    },
+                },
                 "on_purpose": {
                     f"{sensor}/{name}": dict(entry.shows)
                     for (sensor, name), entry in self.simulated.items()

@@ -384,6 +384,7 @@ def settings_of(sensors: Mapping[str, Sensor], requirements: Mapping[str, Requir
             "report": {"title": TITLE, "units": "practical"},
             "results": "results",
             "settings": {name: getattr(run, name).model_dump(mode="json") for name in sections},
+            "models": {"drawn": {"draws": 2, "seed": 1}, "sensors": {}},
             "sensors": {
                 name: one.model_dump(
                     mode="json", include={"vendor", "model", "price_class", "sold"}

@@ -64,7 +64,7 @@ class Budget:
         mean = along + math.fsum(abs(vector) ** 2 for vector in vectors) / 2.0
         apart = abs(sum(vector**2 for vector in vectors)) / 2.0
         ratio = math.sqrt(max(mean - apart, 0.0) / (mean + apart)) if mean else 0.0
-        factor = float(np.interp(ratio, *_tabulate_radii(confidence)))
+        factor = float(np.interp(ratio, *tabulate_radii(confidence)))
         return replace(
             self,
             contributions=[
@@ -82,7 +82,7 @@ _ANGLES = 4096
 
 
 @cache
-def _tabulate_radii(confidence: float) -> tuple[Array, Array]:
+def tabulate_radii(confidence: float) -> tuple[Array, Array]:
     """Return ratios of the standard deviations along two axes, and factors for the radius.
 
     A factor is the radius over z times the root of the sum of both variances, with the normal

@@ -15,6 +15,7 @@ async function openPage(main) {
   startTabs(main);
   startCard(main);
   startMatrices(main);
+  startRequirement(main);
   startChooser(main);
   startComparison(main);
   startFigures(main);
