@@ -79,7 +79,7 @@ def main() -> int:
         word, margin = SHORT_VERDICTS[row.verdict], number_text(row.margin, 3)
         judged = row.margin is not None and row.verdict != "excluded"
         link = rf'sensors/{row.sensor}\.html#requirement-{row.requirement}"'
-        cell = re.search(rf'<td class="cell[^>]*>\s*<a href="{link}>(.*?)</td>', start, re.S)
+        cell = re.search(rf'<td class="cell[^>]*>\s*<a href="{link}(.*?)</td>', start, re.S)
         other = other_margins_text(row) if judged else ""
         check("start page", row, read_text(cell[1]) if cell else "", word, other)
         own = (report / "sensors" / f"{row.sensor}.html").read_text()

@@ -279,8 +279,10 @@ def describe_change(row: comparisons.DriftRow, *, simulated: bool) -> str:
 
 
 def _describe_margins(row: comparisons.RankingRow) -> str:
-    """Return the margins of a verdict; empty if the sensor is not judged."""
-    if row.margin is None or row.verdict == "excluded":
+    """Return the margins of a verdict, or the properties that a sensor lacks."""
+    if row.verdict == "excluded":
+        return "; ".join(map(verdicts.shortfall_text, row.shortfalls))
+    if row.margin is None:
         return ""
     parts = [f"margin in use {number_text(row.margin, 3)}", verdicts.other_margins_text(row)]
     return ", ".join(filter(None, parts))

@@ -150,7 +150,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         first = max(judged, key=lambda cell: cell.order, default=None)
         requirement = Requirement.model_validate(declared)
         limits = [
-            f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
+            f"{x.error.replace('_', ' ')} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
             for x in requirement.limits
         ]
         columns.append(Column(name, requirement.title, limits))
