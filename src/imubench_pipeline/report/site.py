@@ -129,8 +129,17 @@ class Site:
 
     @property
     def title(self) -> str:
-        """Title of the report."""
+        """Title of the report; of a single log, its name."""
+        if self.is_single:
+            (view,) = self.views
+            name = self.names[view.sensor]
+            return view.name if name.endswith(f" {view.name}") else f"{name}: {view.name}"
         return str(self.settings["report"]["title"])
+
+    @property
+    def is_single(self) -> bool:
+        """Whether the report is of one log: then its page is the only one of data."""
+        return self.at_once is not None and len(self.views) == 1
 
     @property
     def system(self) -> System:
@@ -190,7 +199,8 @@ class Site:
     @cached_property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages of the navigation bar, with their names."""
-        return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
+        shown = [] if self.is_single else self.entries
+        return [(entry.file, entry.title) for entry in shown if entry.exists(self)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -268,6 +278,7 @@ class Site:
         return {
             "title": self.title,
             "navigation": self.navigation,
+            "single": self.is_single,
             "units": {quantity: list(choices) for quantity, choices in list_page_units().items()},
             "first_units": choose_first_units(self.system),
             "names": self.names,
