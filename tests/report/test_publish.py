@@ -547,8 +547,8 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
     read = sound(tmp_path)
     assert f"recordings/{name}/{name}.html" in read and f"sensors/{name}.html" in read
     for path, page in read.items():
-        tags = {one.tag for one in page.elements}
-        assert "img" not in tags or path == "theory.html"
+        images = [one.attributes["src"] for one in page.elements if one.tag == "img"]
+        assert all(address.startswith("data:image/svg+xml") for address in images), path
         assert all(one.text.strip().startswith("{") for one in page.scripts if one.text), path
         assert HOSTILE in page.text
     page = read[f"recordings/{name}/{name}.html"]
@@ -981,6 +981,21 @@ def test_one_file_needs_no_other_file(report: Report, whole: Read) -> None:
 def test_one_file_has_pages_without_fault_each(whole: Read) -> None:
     for part in re.findall(r"<template.*?</template>", whole.source, flags=re.DOTALL):
         assert Read(part, fragment=True).faults == []
+
+
+def test_a_report_of_one_log_is_one_page_with_its_name() -> None:
+    site = run(recording_rows("imu", "night"))
+    single = replace(site, settings={**site.settings, "at_once": "imubench analyse night.csv"})
+    page = Read(render_one_file(single))
+    paths = [one.attributes["id"] for one in page.elements if one.tag == "template"]
+    assert paths == ["page:index.html", "page:theory.html", "page:made.html"]
+    titles = {one.text for one in page.elements if one.tag in ("title", "h1")}
+    assert {f"{single.names['imu']}: night"} == {one for one in titles if "night" in one}
+    menus = [one for one in page.elements if one.tag == "nav"]
+    assert [one.page for one in menus] == ["page:theory.html"]  # its own contents
+    assert "sensors compared" not in page.text
+    led = {link.partition("#")[0] for link in page.links if not link.startswith("data:")} - {""}
+    assert led <= {"index.html", "theory.html", "made.html"}
 
 
 @pytest.mark.release

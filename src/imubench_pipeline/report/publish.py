@@ -25,7 +25,7 @@ from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import find_term, read_glossary
 from imubench_pipeline.report.models import make_models
-from imubench_pipeline.report.pages import ENTRIES, list_pages, read_plotting_script
+from imubench_pipeline.report.pages import ENTRIES, MADE, THEORY, list_pages, read_plotting_script
 from imubench_pipeline.report.palette import AXIS_STYLES, TERM_COLOURS
 from imubench_pipeline.report.practical import System, choose_page_unit, list_page_units
 from imubench_pipeline.report.run_summary import fold_text
@@ -328,9 +328,13 @@ def _make_assets() -> dict[str, str]:
 def render_one_file(site: Site) -> str:
     """Return the whole report as one page that needs no other file."""
     templates = make_templates(site.system)
+    pages = list(list_pages(site))
+    if site.is_single:
+        explained = [page for page in pages if page.path in (THEORY.file, MADE.file)]
+        pages = [replace(pages[0], path="index.html"), *explained]
     shown = [
         {"path": page.path, "content": _make_page(site, templates, page, "fragment.html.jinja")}
-        for page in list_pages(site)
+        for page in pages
     ]
     assets = _make_assets()
     scripts = (assets[f"assets/{name}.js"] for name in ("report", "plotly.min"))
@@ -338,7 +342,7 @@ def render_one_file(site: Site) -> str:
         pages=shown,
         css=assets["assets/report.css"],
         scripts=[script.replace("</script", "<\\/script") for script in scripts],
-        search=make_search_index(site).replace("<", "\\u003c"),
+        search="[]" if site.is_single else make_search_index(site).replace("<", "\\u003c"),
         models=make_models(site).replace("<", "\\u003c"),
         site=site.shown(alone=True),
         path="index.html",

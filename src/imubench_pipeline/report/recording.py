@@ -18,6 +18,7 @@ from imubench_pipeline.report import meaning, payload
 from imubench_pipeline.report.comparison import make_methods_table
 from imubench_pipeline.report.datasheets import compare_with_datasheet
 from imubench_pipeline.report.log_screen import Event, list_events
+from imubench_pipeline.report.picture import draw_picture
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
@@ -182,6 +183,7 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         "channels": described,
         "quantities": [
             _tabulate_recommended(quantity, own)
+            | {"picture": draw_picture([one["view"] for one in own], site.system)}
             for quantity in QUANTITY_NAMES
             if (own := [one for one in described if one["view"].quantity == quantity])
         ],

@@ -16,6 +16,7 @@ from imubench_pipeline.report.datasheets import compare_with_datasheet, format_r
 from imubench_pipeline.report.log_screen import group_events
 from imubench_pipeline.report.palette import make_recording_styles
 from imubench_pipeline.report.payload import FOREST, pack_styles
+from imubench_pipeline.report.picture import draw_picture
 from imubench_pipeline.report.practical import System, format_temperature
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import explain_missing_rank, summarise_recordings
@@ -96,7 +97,7 @@ def _make_sensor_context(
         + summarise_recordings(own, several=False),
         "answer": verdicts.sensor_answer_text(_list_verdicts(site, sensor)),
         "verdicts": list(trace_verdicts(site, sensor, own)),
-        "card": chosen and _describe_card(chosen),
+        "card": chosen and _describe_card(chosen, site.system),
         "missing": list(_list_missing(own)),
         "events": list(_list_events(own, site.system)),
         "commands": {
@@ -166,9 +167,14 @@ def _choose_recording(
     return max(drawn, key=preference, default=None)
 
 
-def _describe_card(view: RecordingView) -> Mapping[str, object]:
-    shown = {channel.quantity for channel in view.channels()}
-    quantities = [(key, name) for key, name in QUANTITY_NAMES.items() if key in shown]
+def _describe_card(view: RecordingView, system: System) -> Mapping[str, object]:
+    """Return the recording of a card, and the quantities that it shows, with a picture of each."""
+    drawn = {key: [one for one in view.channels() if one.quantity == key] for key in QUANTITY_NAMES}
+    quantities = [
+        (key, QUANTITY_NAMES[key], draw_picture(channels, system))
+        for key, channels in drawn.items()
+        if channels
+    ]
     return {"recording": view.name, "quantities": quantities}
 
 

@@ -130,8 +130,17 @@ class Site:
 
     @property
     def title(self) -> str:
-        """Title of the report."""
+        """Title of the report; of a single log, its name."""
+        if self.is_single:
+            (view,) = self.views
+            name = self.names[view.sensor]
+            return view.name if name.endswith(f" {view.name}") else f"{name}: {view.name}"
         return str(self.settings["report"]["title"])
+
+    @property
+    def is_single(self) -> bool:
+        """Whether the report is of one log: then its page is the only one of data."""
+        return self.at_once is not None and len(self.views) == 1
 
     @property
     def system(self) -> System:
@@ -269,8 +278,9 @@ class Site:
         """Return the data of the site for all templates; ``alone``: for a report of one file."""
         return {
             "title": self.title,
-            "menu": [entry for entry in self.existing if not entry.about],
+            "menu": [] if self.is_single else [entry for entry in self.existing if not entry.about],
             "experiments": [entry for entry in self.existing if entry.about],
+            "single": self.is_single,
             "units": {quantity: list(choices) for quantity, choices in list_page_units().items()},
             "first_units": choose_first_units(self.system),
             "names": self.names,

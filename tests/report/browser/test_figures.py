@@ -28,7 +28,7 @@ PLACES = """sketch => {
     return upright ? ["x", [text, number(tick, "x1")]] : ["y", [text, number(tick, "y1")]];
   });
   const of = (axis) => ticks.filter(([name]) => name === axis).map(([, tick]) => tick);
-  const dots = [...sketch.querySelectorAll("svg circle")];
+  const dots = [...sketch.querySelectorAll("svg circle")].filter((dot) => number(dot, "r") < 4);
   const at = (name) => dots.map((dot) => number(dot, name));
   return { x: of("x"), y: of("y"), "curve x": at("cx"), "curve y": at("cy") };
 }"""
@@ -176,7 +176,8 @@ def test_sketch_matches_the_curve_before_the_script_loads(read: Open, bench: Rep
         assert len(ticks) >= 2
         slope, begin = np.polyfit(np.log10([*ticks]), [*ticks.values()], 1)
         expected = begin + slope * np.log10(values)
-        np.testing.assert_allclose(places[f"curve {axis}"], expected, atol=0.6)  # pixels
+        dots = places[f"curve {axis}"][: len(rows)]  # of the first axis
+        np.testing.assert_allclose(dots, expected, atol=0.6)  # pixels
     assert reader.figure("allan", channel="gyro_x").locator("svg.sketch").count() == 0
 
 

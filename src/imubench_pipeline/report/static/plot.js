@@ -261,7 +261,8 @@ function noiseMarks(views, ranges) {
       ...guide, type: "scatter", mode: "markers", x: [at], y: [along(at)], hoverinfo: "skip", marker: { color: paper, size: 9, line: { color: ink, width: 2 } },
     });
     const unit = unitOf(quantity, symbol);
-    const text = values.length > 1 ? interval(values[0] * unit.factor, values.at(-1) * unit.factor) : estimateTexts(...found[0].slice(0, 3), unit)[0];
+    const [low, high] = [values[0], values.at(-1)].map((value) => numberText(value * unit.factor, 3));
+    const text = low === high ? estimateTexts(...found[0].slice(0, 3), unit)[0] : `${low} to ${high}`;
     made.labels.push({ x: at, y: along(at), text: `<b>${name}</b> ${text} ${unit.sign}`, colour: ink });
   }
   return made;
@@ -481,7 +482,7 @@ function startPrinting() {
       each.dataset.closed = "yes";
       each.open = true;
     });
-    if (window.Plotly) everyFigure().forEach(drawFigure);
+    everyFigure().forEach(window.Plotly ? drawFigure : sketchFigure);
   });
   window.addEventListener("afterprint", () => {
     document.documentElement.dataset.printing = "no";

@@ -29,7 +29,7 @@ function searchFor(text, entries) {
 
 function startSearch() {
   const units = document.querySelector("header .units");
-  if (!units) return;
+  if (!units || document.getElementById("search-index")?.textContent === "[]") return; // a single log
   const root = (document.body.dataset.plotting ?? "").replace("assets/plotly.min.js", "");
   const form = element("form", { className: "search" });
   form.setAttribute("role", "search");

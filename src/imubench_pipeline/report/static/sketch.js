@@ -21,12 +21,14 @@ function sketchFigure(figure) {
   if (named || made.traces.some((trace) => trace.orientation === "h")) return; // the left margin depends on the names of the rows
   zoomIn(figure, layout);
   const canvas = figure.querySelector(".canvas");
-  if (made.height) canvas.style.height = `${made.height}px`;
+  const paper = printing() ? onPaper(figure) : {};
+  const height = made.height ?? paper.height;
+  if (height) canvas.style.height = `${height}px`;
   const traces = made.traces.filter((trace) => isOn(trace, (group) => on.get(group) ?? true));
   choices.set(figure, on);
-  dress(figure, layout, { ...made, traces }, [canvas.clientWidth, canvas.clientHeight]);
+  dress(figure, layout, { ...made, traces }, [paper.width ?? canvas.clientWidth, canvas.clientHeight]);
   choices.delete(figure);
-  const drawing = new Sketch(canvas.clientWidth, canvas.clientHeight, layout, traces);
+  const drawing = new Sketch(paper.width ?? canvas.clientWidth, canvas.clientHeight, layout, traces);
   canvas.replaceChildren(drawing.svg);
   figure.dataset.sketched = "yes";
 }
