@@ -166,7 +166,17 @@ _PAGE_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (
     *("address", "numbers", "terms", "tables", "tools", "plot", "sketch", "overlay", "ratios"),
-    *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "requirement", "start"),
+    *(
+        "comparison",
+        "side_by_side",
+        "tabs",
+        "search",
+        "channel",
+        "trend",
+        "requirement",
+        "mine",
+        "start",
+    ),
 )
 
 Progress = Callable[[str], None]
