@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 from imubench_pipeline.estimators.rows import read_recommended_estimates
+from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.navigation.error_budget.in_use import (
     collect_figures_in_use,
@@ -19,10 +20,10 @@ from imubench_pipeline.settings.requirements import validate_requirements
 def make_models(site: Site) -> str:
     """Return requirements and models as JSON; ``null`` if there are none."""
     settings = site.settings.get("models")
+    if not settings:
+        return "null"
     requirements = validate_requirements(site.settings["requirements"])
     packed = [compact.pack_requirement(*one) for one in requirements.items()]
-    if not settings or not any(packed):
-        return "null"
     temperature: dict[tuple[str, str], list[TemperatureRow]] = {}
     for row in site.rows(TemperatureRow):
         temperature.setdefault((row.sensor, row.recording), []).append(row)
@@ -57,4 +58,34 @@ def make_models(site: Site) -> str:
             },
         }
     listed = [one for one in packed if one]
-    return json.dumps({"requirements": listed, "sensors": sensors}, separators=(",", ":"))
+    content = {"requirements": listed, "sensors": sensors, "mine": _list_own_numbers(site)}
+    return json.dumps(content, separators=(",", ":"))
+
+
+def _list_own_numbers(site: Site) -> dict[str, dict[str, float]]:
+    """Return the numbers of each sensor that others are compared with.
+
+    They are recommended parameters of its longest recording, a usable and measured one if there is
+    one, by channel and symbol; and its margins, by requirement, and error and time of a limit.
+    """
+    numbers: dict[str, dict[str, float]] = {sensor: {} for sensor in site.sensors}
+    chosen: dict[str, str] = {}
+    for view in sorted(
+        (view for view in site.views if view.static and not view.left_out),
+        key=lambda view: (not view.row.decides, view.simulated, -(view.row.duration or 0.0)),
+    ):
+        chosen.setdefault(view.sensor, view.name)
+    table = site.tables["parameters"]
+    table = table.filter(table["recommended"]).select(
+        ["sensor", "recording", "channel", "parameter", "component", "value"]
+    )
+    for row in table.to_pylist():
+        if row["component"] == 1 and row["value"] and chosen.get(row["sensor"]) == row["recording"]:
+            numbers[row["sensor"]][f"{row['channel']}.{row['parameter']}"] = row["value"]
+    for ranked in site.rows(RankingRow):
+        if ranked.margin:
+            own, name = numbers.setdefault(ranked.sensor, {}), ranked.requirement
+            own[f"{name}/{ranked.error}/{ranked.time:g}"] = ranked.margin
+            if ranked.decides:
+                own[name] = ranked.margin
+    return numbers

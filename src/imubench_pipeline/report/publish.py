@@ -170,7 +170,7 @@ _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (
     *("address", "numbers", "terms", "tables", "tools", "plot", "sketch", "overlay", "ratios"),
     *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "requirement", "card"),
-    "start",
+    *("mine", "start"),
 )
 
 Progress = Callable[[str], None]

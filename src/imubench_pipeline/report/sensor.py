@@ -25,7 +25,7 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.estimates import symbol_text
-from imubench_pipeline.words.events import events_text
+from imubench_pipeline.words.events import events_text, missing_axes_texts
 from imubench_pipeline.words.numbers import (
     NO_VALUE,
     count_digits,
@@ -98,7 +98,7 @@ def _make_sensor_context(
         "answer": verdicts.sensor_answer_text(_list_verdicts(site, sensor)),
         "verdicts": list(trace_verdicts(site, sensor, own)),
         "card": chosen and _describe_card(chosen, site.system),
-        "missing": list(_list_missing(own)),
+        "missing": _list_missing(own),
         "events": list(_list_events(own, site.system)),
         "commands": {
             label: list(lines)
@@ -178,12 +178,12 @@ def _describe_card(view: RecordingView, system: System) -> Mapping[str, object]:
     return {"recording": view.name, "quantities": quantities}
 
 
-def _list_missing(own: Sequence[RecordingView]) -> Iterator[str]:
-    """Yield a line for each quantity that no recording has."""
-    shown = {channel.quantity for view in own if view.static for channel in view.channels()}
-    for key, name in QUANTITY_NAMES.items():
-        if shown and key not in shown:
-            yield f"{name}: not in the logs."
+def _list_missing(own: Sequence[RecordingView]) -> list[str]:
+    """Return a line for each sensor whose axes are not all in the recordings."""
+    static = [view for view in own if view.static]
+    shown = {channel.channel for view in static for channel in view.channels()}
+    named = {row.channel for view in static for row in view.findings if row.channel}
+    return missing_axes_texts(shown, named) if shown else []
 
 
 def _list_events(own: Sequence[RecordingView], system: System) -> Iterator[str]:

@@ -35,7 +35,12 @@ def _make_context(site: Site) -> Mapping[str, object]:
         boards.setdefault(row.requirement, []).append(line)
     return {
         "boards": [
-            {"title": asked[name]["title"], "note": asked[name].get("note"), "rows": lines}
+            {
+                "name": name,
+                "title": asked[name]["title"],
+                "note": asked[name].get("note"),
+                "rows": lines,
+            }
             for name, lines in boards.items()
         ]
     }

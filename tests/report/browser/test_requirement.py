@@ -266,3 +266,33 @@ def test_the_address_carries_the_requirement(
     assert own.all_inner_texts() == after
     assert page.get_by_label("Allowed heading (deg)").input_value() == "200"
     assert page.evaluate(TOO_WIDE) == []
+
+
+def test_numbers_are_multiples_of_the_own_sensor_on_every_page(read: Open, bench: Report) -> None:
+    page = read(bench.folder).page
+    assert page.locator(".mine").count() == 0
+    page.locator("[data-decisions]").get_by_role(
+        "button", name="My sensor: Vendor & Sons A-1"
+    ).click()
+    page.locator(".mine").first.wait_for()
+    assert "mine=alpha" in page.evaluate("location.hash")
+    page = read(bench.folder, "sensors/beta.html#mine=alpha").page
+    page.locator(".mine").first.wait_for()
+    for text in page.locator("td:has(> data) > .mine").all_inner_texts():
+        assert text == "mine" or text.endswith(" × mine")
+    margins = {
+        (row["requirement"], row["error"]): {
+            one["sensor"]: one["margin"]
+            for one in bench.of("ranking", requirement=row["requirement"], error=row["error"])
+        }
+        for row in bench.of("ranking", sensor="beta")
+        if row["margin"]
+    }
+    for (requirement, error), of in margins.items():
+        place = f"[data-from^='ranking/{requirement}/beta/{error}/'][data-from$='/margin'] + .mine"
+        said = page.locator(place).first.inner_text()
+        assert float(said.split(" ")[0]) == pytest.approx(of["beta"] / of["alpha"], rel=0.06)
+    page.locator("h1 .pin").click()  # beta instead
+    assert "mine=beta" in page.evaluate("location.hash")
+    page.locator("h1 .pin").click()
+    assert page.locator(".mine").count() == 0 and "mine" not in page.evaluate("location.hash")

@@ -28,12 +28,12 @@ def test_a_term_explains_itself_under_the_pointer(read: Open, bench: Report) -> 
 
 def test_a_term_explains_itself_under_the_keyboard(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
-    term = reader.page.locator("main [data-term=requirement]").first
+    term = reader.page.locator("main [data-term=allan_deviation]").first
     term.focus()
-    expect(tip(reader)).to_have_text(read_glossary()["requirement"].short)
+    expect(tip(reader)).to_have_text(read_glossary()["allan_deviation"].short)
     reader.page.keyboard.press("Escape")
     expect(tip(reader)).to_have_count(0)
-    assert reader.page.evaluate("document.activeElement.dataset.term") == "requirement"
+    assert reader.page.evaluate("document.activeElement.dataset.term") == "allan_deviation"
     reader.page.keyboard.press("Tab")
     following = reader.page.evaluate("document.activeElement.dataset.term")
     expect(tip(reader)).to_have_text(read_glossary()[following].short)
@@ -72,6 +72,7 @@ def test_every_term_leads_to_the_theory(read: Open, bench: Report) -> None:
             found.add(key)
     assert {"missing_samples", "N", "not_identified", "absent", "likelihood", "tau"} <= found
     reader.open("index.html")
+    reader.page.locator("#warnings-head").click()
     reader.show(reader.page.locator("main a[data-term=missing_samples]").first).click()
     row = reader.page.locator("tr#missing_samples, tr:target").first
     expect(row).to_be_in_viewport()

@@ -31,7 +31,14 @@ function lookOfChosen(one) {
 function startComparison(root) {
   const pickers = root.querySelector(".pickers");
   if (!pickers) return;
-  const sensors = [...new Set(pageData.recordings.map((row) => row.sensor))].sort((a, b) => recordingOf(b).decides - recordingOf(a).decides);
+  // The reader's own sensor, then usable, sold and measured ones, with many axes.
+  const order = (sensor) => {
+    const row = recordingOf(sensor);
+    const axes = pageData.channels.filter((view) => view.sensor === sensor && view.recording === row.recording).length;
+    return [sensor !== mine, !row.decides, !row.sold, row.simulated, -axes].map(Number);
+  };
+  const sensors = [...new Set(pageData.recordings.map((row) => row.sensor))]
+    .sort((a, b) => order(a).map((one, i) => one - order(b)[i]).find((one) => one !== 0) ?? 0);
   const stated = [...LETTERS].map((letter) => state.get(letter)).filter(Boolean);
   const kept = chosenFrom(stated);
   const others = pageData.recordings.length > sensors.length && sensors.length === 1 ? pageData.recordings.map((row) => `${row.sensor}/${row.recording}`) : sensors;

@@ -428,7 +428,7 @@ const WORST_FIRST = ["fails", "likely_fails", "not_enough_data", "meets_if", "li
 
 // Returns the verdict, margin and rank of each sensor, as `verdicts.judgement` and `selection`.
 function judgeSensors(models, requirement) {
-  const judged = {};
+  const judged = Object.create(null);
   const by = requirement.limits.map((limit) => {
     const levers = listLevers(limit, requirement);
     const errors = Object.entries(models.sensors).map(([name, sensor]) =>
@@ -473,7 +473,7 @@ function loadModels() {
   loadedModels ??= new Promise((found) => {
     const own = document.getElementById("models");
     if (own) return found(JSON.parse(own.textContent, withoutPrototype));
-    window.imubenchModels = found;
+    window.imubenchModels = (models) => found(JSON.parse(JSON.stringify(models), withoutPrototype));
     document.head.append(element("script", { src: document.body.dataset.plotting.replace("plotly.min.js", "models.js") }));
   });
   return loadedModels;
@@ -543,9 +543,10 @@ function startRequirement(main) {
   fold.append(form, said);
   const open = async () => {
     const models = await loadModels();
-    if (!models || form.childElementCount) return;
+    if (!models?.requirements.length || form.childElementCount) return;
     let own = readRequirement(models, state.get("yours"));
     const show = () => showOwn(main, said, judgeOwn(models, own));
+    main.addEventListener("pinned", show);
     const changed = () => {
       keep("yours", requirementText(own));
       show();
@@ -606,7 +607,9 @@ function showOwn(main, said, judged) {
     const named = main.querySelector(`.legend > .${verdict.replaceAll("_", "-")}`);
     const size = margin !== null && verdict !== "excluded" && numberText(margin, Math.min(countDigits(margin, ...margins), 3));
     const words = `<span class="said">${named.querySelector("svg").outerHTML}<b>${named.querySelector("b").textContent}</b>${conditions ? ` <small>${conditions} not known</small>` : ""}</span>`;
-    put(row, "td", `${words}${size ? ` <span class="size"><span class="value">${size}</span></span> <small class="ranked">noise alone ${numberText(noise, 2)}${rank ? `, rank ${rank}` : ""}</small>` : ""}`, `cell ${verdict.replaceAll("_", "-")}${conditions ? " conditional" : ""}`);
+    const reference = judged[mine]?.margin;
+    const multiple = !(reference > 0) ? "" : row.dataset.sensor === mine ? "mine" : `${numberText(margin / reference, 2)} × mine`;
+    put(row, "td", `${words}${size ? ` <span class="size"><span class="value">${size}</span>${multiple && `<span class="mine">${multiple}</span>`}</span> <small class="ranked">noise alone ${numberText(noise, 2)}${rank ? `, rank ${rank}` : ""}</small>` : ""}`, `cell ${verdict.replaceAll("_", "-")}${conditions ? " conditional" : ""}`);
   }
   const first = [...table.tBodies[0].rows].filter((row) => judged[row.dataset.sensor]?.rank === 1);
   const names = first.map((row) => row.cells[0].querySelector("a").textContent).join(", ");

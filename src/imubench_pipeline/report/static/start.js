@@ -11,6 +11,7 @@ async function openPage(main) {
   pageData = data ? JSON.parse(data.textContent, withoutPrototype) : {};
   decoded = [];
   showUnits(main);
+  startMine(main);
   startTables(main);
   startTabs(main);
   startCard(main);
