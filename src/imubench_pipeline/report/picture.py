@@ -78,7 +78,7 @@ def draw_picture(views: Sequence[ChannelView], system: System) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" '
         f'font-family="sans-serif" font-size="26">{"".join(parts)}</svg>'
     )
-    return "data:image/svg+xml," + quote(svg.replace('"', "'"), safe=" /:=',;()")
+    return "data:image/svg+xml," + quote(svg.replace('"', "'"), safe="/:=',;()")
 
 
 def _draw_curves(

@@ -237,7 +237,8 @@ def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]
         "matters": event.score() > 0.0 and first.severity != "note",
         "channel": channels_text(event.channels),
         "linked": False,
-        "short": re.split(r"(?<=\D[.;:]) ", numbers.sentence(text), maxsplit=1)[0].rstrip(":;"),
+        "short": re.split(r"(?<=\D[.;:]) ", numbers.sentence(text), maxsplit=1)[0].rstrip(":;.")
+        + ".",
         "detail": text,
         "spans": spans,
         "start": min((start for start, _ in spans), default=None),
