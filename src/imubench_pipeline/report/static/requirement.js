@@ -549,6 +549,7 @@ function startRequirement(main) {
     main.addEventListener("pinned", show);
     const changed = () => {
       keep("yours", requirementText(own));
+      remember("imubench yours", requirementText(own));
       show();
     };
     const fill = () => {
