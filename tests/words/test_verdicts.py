@@ -36,6 +36,7 @@ from imubench_pipeline.words.verdicts import (
     spread_text,
     stated_verdict,
     subject_text,
+    summary_text,
     verdict_text,
 )
 
@@ -316,6 +317,25 @@ NAMES = {name: name.upper() for name in "abcdefgh"}
 
 def answer(*rows: RankingRow, asked: int | None = None, excluded: int = 0) -> str:
     return answer_text(rows, NAMES, len(rows) if asked is None else asked, excluded)
+
+
+def test_one_sentence_names_the_sensors_to_choose() -> None:
+    unknown = Condition("turn_on_bias", None, "accel", 0.1)
+    best = {
+        "Rover": row(),
+        "Boat": row("b", "likely_meets"),
+        "Drone": row("b", "meets_if", conditions=(unknown, unknown)),
+        "Car": row("a", "fails"),
+        "Truck": row("c", "cannot_meet"),
+        "Train": row("c", "likely_fails"),
+        "Ship": None,
+        "Bus": row(),
+    }
+    assert summary_text(best, NAMES) == (
+        "A meets Rover and Bus. B likely meets Boat. "
+        "B meets Drone if 2 unknown figures are good enough. No sensor meets Car or Truck. "
+        "No sensor is shown to meet Train. No sensor can be judged for Ship."
+    )
 
 
 @pytest.mark.parametrize(

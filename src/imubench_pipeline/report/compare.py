@@ -75,6 +75,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "recordings": recordings,
             "errors": errors,
             "window": parse_quantity(window, "time"),
+            "verdicts": verdicts.SHORT_VERDICTS,
             "requirements": [
                 {
                     "title": requirement.title,

@@ -261,6 +261,11 @@ def test_the_address_carries_the_requirement(
     assert page.locator(".margins .own circle").count() == 2
     hash_of_page = page.evaluate("location.hash")
     assert "yours=rover*" in hash_of_page
+    page = read(folder, f"compare.html{hash_of_page}&a=alpha&b=beta").page
+    row = page.locator("table.requirements .own")
+    row.wait_for()
+    assert row.locator("th").inner_text() == "Yours: heading 200 deg in 600 s"
+    assert row.locator("td").first.inner_text().startswith("meets, margin ")
     page = read(folder, f"index.html{hash_of_page}").page
     own.first.wait_for()
     assert own.all_inner_texts() == after

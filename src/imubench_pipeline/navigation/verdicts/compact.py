@@ -27,8 +27,8 @@ from imubench_pipeline.settings.sensor import quantity_of
 MAX_RECORDINGS = 20
 """Maximum number of packed recordings of a sensor; of more, they are evenly selected."""
 
-_MIN_DRAWS = 50
-_MAX_DRAWN = 400  # maximum number of drawn models of all recordings of a sensor, or `_MIN_DRAWS`
+_MIN_DRAWS = 100
+_MAX_DRAWN = 800  # maximum number of drawn models of all recordings of a sensor, or `_MIN_DRAWS`
 
 Packed = dict[str, Any]
 """Plain values, SI."""

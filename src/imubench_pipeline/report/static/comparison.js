@@ -209,8 +209,13 @@ function drawVerdicts(root, figures) {
   table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better; significant where the 95 % interval of the ratio excludes 1`;
+  table.closest(".scroll").hidden = missing.length > 0;
+  root.querySelector("figure[data-kind=pair]").hidden = missing.length === chosen.length;
+  root.querySelector("figure[data-kind=dumbbells]").hidden = missing.length > 0;
+  const common = Object.keys(CHANNEL_NAMES).filter((name) => chosen.every((one) => channelFor(one, name)));
+  const instead = common.length > 0 ? `choose ${common.map((name) => CHANNEL_NAMES[name]).join(" or ")}` : "they have no axis in common";
   const words = missing.length > 0
-    ? [`${missing.map(shortName).join(" and ")} ${missing.length > 1 ? "have" : "has"} no ${CHANNEL_NAMES[chosenChannel]}: choose another axis.`]
+    ? [`${missing.map(shortName).join(" and ")} recorded no ${CHANNEL_NAMES[chosenChannel]}: ${instead}.`]
     : chosen.slice(1).map((other, place) => sentenceOf(figures, chosen[0], other, place));
   root.querySelector(".answer").textContent = words.join("\n");
   root.querySelector(".stands").textContent = chosen.filter((one) => !one.key.includes("/"))

@@ -5,12 +5,14 @@ let mine = null;
 const sensorOf = (address) => decodeURIComponent(address ?? "").match(/sensors\/([^/#]+)\.html/)?.[1];
 
 function startMine(main) {
-  mine = state.get("mine") || remembered("imubench mine") || null;
+  mine = state.get("mine") || (remembered("imubench mine") ?? mine) || null;
   if (mine && (location.hash === "" || stateText(location.hash))) keep("mine", mine);
   const show = () => {
     putPins(main);
     showMultiples(main);
   };
+  if (main.dataset.pins) return show(); // another page of a report in one file
+  main.dataset.pins = "yes";
   main.addEventListener("click", (event) => {
     const pin = event.target instanceof Element ? event.target.closest(".pin") : null;
     if (!pin) return;
@@ -20,7 +22,7 @@ function startMine(main) {
     main.querySelectorAll(".mine").forEach((one) => one.remove());
     main.querySelectorAll("[data-multiple]").forEach((one) => one.removeAttribute("data-multiple"));
     main.querySelectorAll(".pin").forEach(drawPin);
-    main.dispatchEvent(new Event("pinned"));
+    main.querySelector(".yours")?.dispatchEvent(new Event("pinned"));
     show();
   });
   // Rows and sections of tables are made on request.

@@ -546,9 +546,10 @@ function startRequirement(main) {
     if (!models?.requirements.length || form.childElementCount) return;
     let own = readRequirement(models, state.get("yours"));
     const show = () => showOwn(main, said, judgeOwn(models, own));
-    main.addEventListener("pinned", show);
+    fold.addEventListener("pinned", show);
     const changed = () => {
       keep("yours", requirementText(own));
+      remember("imubench yours", requirementText(own));
       show();
     };
     const fill = () => {

@@ -277,6 +277,27 @@ function drawRequirements(root) {
       element("tr", {}, element("th", { scope: "row" }, title), ...chosen.map((one) => element("td", {}, sensors[one.row.sensor] ?? "not ranked"))),
     ),
   );
+  const own = state.get("yours") ?? remembered("imubench yours");
+  if (own) addOwnVerdicts(table, own);
+}
+
+// The verdicts by the requirement of the reader (`requirement.js`).
+async function addOwnVerdicts(table, text) {
+  const models = await loadModels();
+  table.querySelector(".own")?.remove();
+  if (!models?.requirements.length) return;
+  const own = readRequirement(models, text);
+  const judged = judgeOwn(models, own);
+  const limits = own.limits.map(({ error, at_most: most, time }) => {
+    const [unit, factor] = ERROR_UNITS[error];
+    return `${error.replace("_", "-")} ${numberText(most / factor, 3)} ${unit} in ${numberText(time, 3)} s`;
+  });
+  const cells = chosen.map((one) => {
+    const { verdict, margin, noise } = judged[one.row.sensor] ?? { verdict: "not_enough_data", margin: null };
+    const margins = margin === null ? "" : `, margin ${numberText(margin, 3)}, noise alone ${numberText(noise, 2)}`;
+    return element("td", {}, `${pageData.verdicts[verdict]}${margins}`);
+  });
+  table.tBodies[0].append(element("tr", { className: "own" }, element("th", { scope: "row" }, `Yours: ${limits.join(", ")}`), ...cells));
 }
 
 function drawErrors(root) {
