@@ -249,7 +249,7 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])
     site = make_site({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)
     assert site.title == settings["report"]["title"]
-    assert len(list(list_pages(site))) == 7
+    assert len(list(list_pages(site))) == 5
 
 
 def test_a_new_log_does_not_change_the_settings_of_the_report(project: dict[str, Any]) -> None:

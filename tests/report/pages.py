@@ -149,7 +149,7 @@ class Read(HTMLParser):
         """What would be fetched from elsewhere; names of XML are no addresses."""
         found = [link for link in self.links if _URL.match(link) and not link.startswith("data:")]
         shown = self.source
-        for script in self.scripts:
+        for script in sorted(self.scripts, key=lambda one: -len(one.text)):
             shown = shown.replace(script.text, "")
         found += re.findall(r"https?://(?!www\.w3\.org/)[^\s\"'<]*", shown)
         return found + re.findall(r"url\((?!['\"]?data:)[^)]*\)|@import", shown)
