@@ -24,7 +24,7 @@ def main(one_log: Path, results: Path) -> None:
     browser = os.environ.get("PLAYWRIGHT_CHROMIUM") or shutil.which("chromium")
     pictures = {
         "one_log.png": (one_log / "report.html", "figure .plot-container"),
-        "report.png": (results / "report/index.html", "#next-steps + ol"),
+        "report.png": (results / "report/index.html", "table.decisions"),
     }
     with sync_playwright() as driver:
         opened = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
