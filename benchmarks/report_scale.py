@@ -163,7 +163,10 @@ def opening(report: Path) -> Iterator[tuple[str, float, float, float]]:
     pages += ["compare.html", "recordings.html", "datasheets.html"]
     with sync_playwright() as driver:
         root = ["--no-sandbox"] if os.geteuid() == 0 else []
-        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=root)
+        browser = driver.chromium.launch(
+            executable_path=os.environ.get("PLAYWRIGHT_CHROMIUM") or shutil.which("chromium"),
+            args=root,
+        )
         for page in pages:
             tab = browser.new_page()
             start = time.perf_counter()

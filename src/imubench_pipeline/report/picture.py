@@ -20,6 +20,7 @@ from imubench_pipeline.words.numbers import number_text
 _WIDTH, _HEIGHT = 1920, 800
 _LEFT, _RIGHT, _TOP, _BOTTOM = 140, 1720, 60, 700
 _GRADE_FILLS = ("#ffffff", "#f4f5f6", "#eaecee", "#e0e3e5")
+_LINE_POINTS = 24  # of a model and of limits: more would not be seen
 Values = NDArray[np.float64]
 
 
@@ -92,13 +93,14 @@ def _draw_curves(
         colour = AXIS_STYLES[view.axis].light if view.axis in AXIS_STYLES else "#1b1b1b"
         yield text(x, 36, view.channel.replace("_", " "), f'fill="{colour}" font-weight="bold"')
         x += 150
-        edges = f"{places(view.tau, view.upper * scale)} "
-        edges += places(view.tau[::-1], view.lower[::-1] * scale)
+        few = np.unique(np.linspace(0, len(view.tau) - 1, _LINE_POINTS).astype(int))
+        edges = f"{places(view.tau[few], view.upper[few] * scale)} "
+        edges += places(view.tau[few[::-1]], view.lower[few[::-1]] * scale)
         yield f'<polygon points="{edges}" fill="{colour}" opacity=".16"/>'
         dots = places(view.tau, view.adev * scale).replace(" ", "h0M")
         look = f'stroke="{colour}" stroke-width="10" stroke-linecap="round"'
         yield f'<path d="M{dots}h0" {look}/>'
         if view.recommended in view.parameters:
-            model = np.sqrt(view.model(view.recommended).allan_variance(view.tau)) * scale
-            line = places(view.tau, model)
+            model = np.sqrt(view.model(view.recommended).allan_variance(view.tau[few])) * scale
+            line = places(view.tau[few], model)
             yield f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="4"/>'
