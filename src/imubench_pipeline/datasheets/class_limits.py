@@ -30,8 +30,9 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Grade, Sensor
 from imubench_pipeline.units import SI_UNITS, parse_quantity
 
 FILE = Path(__file__).with_name("class_limits.csv")
-_GRADE_FILE = Path(__file__).with_name("grade_limits.csv")
 """The limits of the shipped catalogue."""
+
+_GRADE_FILE = Path(__file__).with_name("grade_limits.csv")
 
 STATEMENTS: Mapping[Cause, tuple[str, ...]] = {
     "turn_on_bias": ("offset", "bias_repeatability"),
@@ -263,7 +264,9 @@ def read_class_limits(path: Path = FILE) -> list[ClassLimit]:
 
 @cache
 def read_grade_limits(quantity: str) -> Mapping[str, Mapping[str, float]]:
-    """Return the largest N and B of each grade, SI, the worst grade first; consumer has none.
+    """Return the largest N and B of each grade, the worst grade first; consumer has none.
+
+    N in rad/s/sqrt(Hz) or m/s^2/sqrt(Hz), two-sided; B in rad/s or m/s^2.
 
     The file names the source of each limit. Between grades, figures of the catalogue overlap; these
     limits are for orientation, not for verdicts.

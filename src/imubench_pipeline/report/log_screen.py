@@ -116,12 +116,10 @@ def list_events(findings: Iterable[FindingRow]) -> list[Event]:
     groups: dict[str, list[FindingRow]] = defaultdict(list)
     for row in findings:
         timed = row.finding in _SUDDEN and row.start is not None
-        if not timed:
-            groups[f"{row.finding} {row.severity}"].append(row)
-        elif row.severity == "note":
-            groups[f"{row.finding} note"].append(row)
-        else:
+        if timed and row.severity != "note":
             sudden.append(row)
+        else:
+            groups[f"{row.finding} {row.severity}"].append(row)
     disturbances: list[list[FindingRow]] = []
     end = -float("inf")
     for row in sorted(sudden, key=lambda row: row.start or 0.0):

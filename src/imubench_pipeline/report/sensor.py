@@ -158,11 +158,11 @@ def _choose_recording(
         for row in site.rows(comparisons.RankingRow)
         if row.sensor == sensor and row.decides
     }
-    drawn = [view for view in own if view.static and view.channels()]
+    drawn = [view for view in own if view.static and view.channel_names]
 
     def preference(view: RecordingView) -> tuple[bool, bool, int, float]:
         used = view.row.decides is not False
-        return view.name in deciding, used, len(view.channels()), view.row.duration or 0.0
+        return view.name in deciding, used, len(view.channel_names), view.row.duration or 0.0
 
     return max(drawn, key=preference, default=None)
 
@@ -181,7 +181,7 @@ def _describe_card(view: RecordingView, system: System) -> Mapping[str, object]:
 def _list_missing(own: Sequence[RecordingView]) -> list[str]:
     """Return a line for each sensor whose axes are not all in the recordings."""
     static = [view for view in own if view.static]
-    shown = {channel.channel for view in static for channel in view.channels()}
+    shown = {name for view in static for name in view.channel_names}
     named = {row.channel for view in static for row in view.findings if row.channel}
     return missing_axes_texts(shown, named) if shown else []
 

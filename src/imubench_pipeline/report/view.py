@@ -218,6 +218,12 @@ class RecordingView:
         allan = self.parts["allan"]
         return (allan["cluster_size"].to_numpy() / allan["tau"].to_numpy()).tolist()
 
+    @property
+    def channel_names(self) -> list[str]:
+        """Names of its channels, which are not made for it."""
+        names: list[str] = self.parts["allan"]["channel"].unique().to_pylist()
+        return names
+
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
         channels = {}

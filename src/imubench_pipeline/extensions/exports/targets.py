@@ -1,6 +1,5 @@
 """The programs that a noise model can be exported to."""
 
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -12,6 +11,7 @@ from imubench_pipeline.extensions.exports import visual_inertial as vi
 from imubench_pipeline.extensions.exports.imu import Imu
 from imubench_pipeline.extensions.exports.overbound import Family
 from imubench_pipeline.extensions.exports.programs import Program
+from imubench_pipeline.report.site import make_command
 
 _MATRICES = "https://doi.org/10.1109/TAC.1978.1101743"  # C. Van Loan (1978), the discretisation
 _JSON = Program("any: matrices as JSON", "N+GM+K", _MATRICES)
@@ -85,7 +85,6 @@ def list_commands(sensor: str, results: str) -> tuple[str, list[tuple[str, str]]
     """Return a label, and for each program the command that writes the file of a sensor."""
     lines = []
     for one in TARGETS.values():
-        words = ["imubench", "export", f"./{results}" if results.startswith("-") else results]
-        words += [f"--sensor={sensor}", "--target", one.name, "--output", one.file_name]
-        lines.append((one.program, shlex.join(words)))
+        options = {"--sensor": sensor, "--target": one.name, "--output": one.file_name}
+        lines.append((one.program, make_command("export", results, options)))
     return "Files for filters and simulators", lines

@@ -1,5 +1,5 @@
 // Judges the sensors by a requirement that the reader changes, from a table of their noise models and
-// figures (`navigation.verdicts.compact`). The formulas are those of `navigation.error_budget` and
+// figures (`navigation.verdicts.compact`), with the formulas of `navigation.error_budget` and
 // `navigation.verdicts`, where time and temperature change evenly until the time of a limit; a test
 // compares both.
 
