@@ -18,6 +18,18 @@ OVERLAPS = """canvas => {
 """Pairs of texts of a figure that overlap, and the number of labels."""
 
 
+def test_labels_do_not_overlap_in_a_window_that_shrinks(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, f"recordings/alpha/{NIGHT.recording}.html", width=1400)
+    canvas = reader.figure("axes", quantity="gyro").locator(".canvas")
+    before = canvas.evaluate("canvas => canvas.layout.datarevision")
+    reader.page.set_viewport_size({"width": 390, "height": 900})
+    reader.page.wait_for_function(
+        "([canvas, before]) => canvas.layout.datarevision !== before",
+        arg=[canvas.element_handle(), before],
+    )
+    assert canvas.evaluate(OVERLAPS)[0] == []
+
+
 @pytest.mark.parametrize("width", [390, 768, 1400])
 def test_labels_do_not_overlap_in_any_unit(read: Open, bench: Report, width: int) -> None:
     reader = read(bench.folder, f"recordings/alpha/{NIGHT.recording}.html", width=width)

@@ -493,4 +493,10 @@ function startPrinting() {
     if (window.Plotly) everyFigure().forEach((figure) => drawn.has(figure) && drawFigure(figure));
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
+  // Labels are placed for the size of a figure.
+  let resizing;
+  window.addEventListener("resize", () => {
+    clearTimeout(resizing);
+    resizing = setTimeout(() => printing() || redrawAll(), 200);
+  });
 }
