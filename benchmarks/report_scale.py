@@ -160,7 +160,7 @@ def opening(report: Path) -> Iterator[tuple[str, float, float, float]]:
     from playwright.sync_api import sync_playwright
 
     pages = ["index.html", "sensors/sensor_00.html", "recordings/sensor_00/night_000.html"]
-    pages += ["compare.html", "recordings.html", "datasheets.html"]
+    pages += ["compare.html", "recordings.html"]
     with sync_playwright() as driver:
         root = ["--no-sandbox"] if os.geteuid() == 0 else []
         browser = driver.chromium.launch(

@@ -5,9 +5,9 @@ Matplotlib would take longer for it than all pages of a recording.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from urllib.parse import quote
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.class_limits import read_grade_limits
@@ -24,8 +24,8 @@ _LINE_POINTS = 24  # of a model and of limits: more would not be seen
 Values = NDArray[np.float64]
 
 
-def draw_picture(views: Sequence[ChannelView], system: System) -> str:
-    """Return measured curves, 95 % limits, models and grades of the axes of a sensor, as a URI."""
+def draw_picture(views: Sequence[ChannelView], system: System) -> Markup:
+    """Return measured curves, 95 % limits, models and grades of the axes of a sensor as SVG."""
     unit = choose_page_unit(views[0].quantity, "adev", system)
     tau = np.concatenate([view.tau for view in views])
     adev = np.concatenate([view.adev for view in views]) * unit.per_si
@@ -75,11 +75,12 @@ def draw_picture(views: Sequence[ChannelView], system: System) -> str:
             parts.append(f'<path d="{line}" stroke="#c8ced2" stroke-width="2"/>')
     parts += _draw_curves(views, unit.per_si, places, text)
     parts.append(text(_LEFT, _HEIGHT - 20, f"Allan deviation ({unit.sign}), averaging time τ (s)"))
-    svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" '
+    # Numbers, units and names of channels, which need no escaping.
+    return Markup(
+        '<svg class="picture" role="img" aria-label="Allan deviation" '
+        f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" '
         f'font-family="sans-serif" font-size="26">{"".join(parts)}</svg>'
     )
-    return "data:image/svg+xml," + quote(svg.replace('"', "'"), safe="/:=',;()")
 
 
 def _draw_curves(
