@@ -244,9 +244,13 @@ function noiseMarks(views, ranges) {
   const made = { traces: [], labels: [] };
   const tau = [0, 1].map((side) => 10 ** ranges.x[side]);
   for (const [symbol, name, slope] of [["N", "N", -0.5], ["B_curve", "B", 0], ["K", "K", 0.5]]) {
-    const of = (view) => view.parameters[view.recommended]?.[symbol]?.find(([value]) => value !== null);
-    const found = views.map((view) => of(view) ?? (symbol === "B_curve" ? view.parameters[view.recommended]?.B?.find(([value]) => value !== null) : undefined)).filter(Boolean);
+    const first = (view, key) => view.parameters[view.recommended]?.[key]?.find(([value]) => value !== null);
+    const of = (view) => first(view, symbol) ?? (symbol === "B_curve" ? first(view, "B") : undefined);
+    const having = views.filter(of);
+    const found = having.map(of);
     if (found.length === 0) continue;
+    // The value of some axes is no value of all.
+    const which = having.length < views.length ? ` (${having.map((view) => view.channel.split("_")[1]).join(", ")})` : "";
     const values = found.map(([value]) => value).sort((a, b) => a - b);
     const middle = Math.exp(values.reduce((sum, value) => sum + Math.log(value), 0) / values.length);
     const along = (time) => level.factor * middle * (slope < 0 ? time ** -0.5 : slope > 0 ? Math.sqrt(time / 3) : FLOOR);
@@ -263,7 +267,7 @@ function noiseMarks(views, ranges) {
     const unit = unitOf(quantity, symbol);
     const [low, high] = [values[0], values.at(-1)].map((value) => numberText(value * unit.factor, 3));
     const text = low === high ? estimateTexts(...found[0].slice(0, 3), unit)[0] : `${low} to ${high}`;
-    made.labels.push({ x: at, y: along(at), text: `<b>${name}</b> ${text} ${unit.sign}`, colour: ink });
+    made.labels.push({ x: at, y: along(at), text: `<b>${name}</b> ${text} ${unit.sign}${which}`, colour: ink });
   }
   return made;
 }
