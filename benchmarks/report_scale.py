@@ -200,7 +200,7 @@ def main() -> None:
 
         def timed(what: str) -> None:
             start = time.perf_counter()
-            written = publish(make_site(tables, settings, results), report)
+            written = publish(make_site(tables, settings, results), report, processes=2)
             print(f"{what}: {time.perf_counter() - start:.1f} s, {len(written)} files written")
 
         timed(f"{given.recordings} recordings x {len(CHANNELS)} channels")

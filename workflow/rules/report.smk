@@ -18,6 +18,7 @@ rule report:
         LOGS + "/report.log",
     group:
         "comparison"
+    threads: 4
     resources:
         **cost(Cost(memory=350, memory_of_each=3, time=2, time_of_each=0.12)),
     params:

@@ -9,4 +9,5 @@ if __name__ == "__main__":
         [Path(path) for path in snakemake.input.tables],
         snakemake.params.settings,
         Path(snakemake.output.page),
+        snakemake.threads,
     )

@@ -13,6 +13,7 @@ frozen dataclass a struct.
 """
 
 import types
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from types import ModuleType
@@ -31,6 +32,7 @@ from typing import (
     get_type_hints,
 )
 
+import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.model.states import Measured, SourceCode, SourcePath, Status
@@ -83,6 +85,24 @@ class TypedColumn:
     def is_list(self) -> bool:
         """Whether a value is a list."""
         return bool(pa.types.is_list(self.type))
+
+    def read(self, content: pa.ChunkedArray) -> list[Any]:
+        """Return the values of a column of an Arrow table, as rows have them."""
+        # The general `to_pylist` makes an object of Arrow for each value.
+        if pa.types.is_floating(content.type):
+            values: list[Any] = content.to_numpy().tolist()
+            for place in np.flatnonzero(content.is_null().to_numpy()) if content.null_count else ():
+                values[place] = None
+            return values
+        if pa.types.is_dictionary(content.type):
+            values = []
+            for chunk in content.chunks:
+                names = [*chunk.dictionary.to_pylist(), None]
+                values += [names[code] for code in chunk.indices.fill_null(-1).to_numpy().tolist()]
+            return values
+        if self.is_list and not any(len(chunk.flatten()) for chunk in content.chunks):
+            return [()] * len(content)
+        return self.from_arrow(content.to_pylist())
 
     def from_arrow(self, values: list[Any]) -> list[Any]:
         """Return values of the column in Python, as a row has them."""
@@ -144,13 +164,12 @@ class TableRow(_Attributes):
     @classmethod
     def rows_of(cls, content: pa.Table) -> list[Self]:
         """Return the rows of an Arrow table that has the columns of this class."""
-        names = names_of(cls)
-        columns = [
-            column.from_arrow(content.column(column.name).to_pylist()) for column in columns_of(cls)
-        ]
-        return [
-            cls(**dict(zip(names, values, strict=True))) for values in zip(*columns, strict=True)
-        ]
+        rows = [cls.__new__(cls) for _ in range(content.num_rows)]
+        for column in columns_of(cls):
+            # One assignment for a whole column is many times faster than a call for each row.
+            store = getattr(cls, column.name).__set__
+            deque(map(store, rows, column.read(content.column(column.name))), maxlen=0)
+        return rows
 
 
 R = TypeVar("R", bound=TableRow)

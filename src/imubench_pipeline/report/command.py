@@ -1,6 +1,7 @@
 """`imubench report`: write the report of a finished run again, elsewhere or in one file."""
 
 import argparse
+import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -79,12 +80,12 @@ def _write(site: "Site", arguments: argparse.Namespace) -> None:
     output: OutputFolder | None = arguments.output
     if output is None:
         folder = arguments.results / "report"
-        written = publish(site, folder, say)
+        written = publish(site, folder, say, os.cpu_count() or 1)
         seal_again(arguments.results, "report", list_report_files(folder))
     else:
         folder = output.path
         with output.filling() as made:
-            written = publish(site, made, say)
+            written = publish(site, made, say, os.cpu_count() or 1)
             draw_comparison(site.tables, site.system, made / "figures")
             remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")

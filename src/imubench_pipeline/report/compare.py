@@ -5,11 +5,11 @@ The script computes the ratios of the recordings that the reader chooses, like `
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
-from math import isnan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import COMPARED
@@ -31,6 +31,7 @@ from imubench_pipeline.words.numbers import duration_text, number_text
 KEPT = ("error_growth", "drawn_deviations")
 """The tables of each recording that the page uses, besides the joined tables."""
 
+_SOURCE_COLUMNS = tuple(field.name for field in fields(ErrorSource))
 _COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
 _MAX_DETAILED_RECORDINGS = 100
 """With more recordings, draws are at whole decades of tau, and errors of worst axes only."""
@@ -165,8 +166,9 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> Json 
     if not kept or not len(kept["error"]):
         return None
     windows, times = (np.unique(kept[name]) for name in ("window", "time"))
+    kept = {**kept, "number": _number_sources(kept)}
     by_axis = {
-        axis: _pack_errors(kept, kept["axis"] == axis, arrays)
+        axis: _pack_errors(_take_rows(kept, kept["axis"] == axis), arrays)
         for axis in dict.fromkeys(kept["axis"].tolist())
         if axis == "worst" or not few
     }
@@ -180,38 +182,51 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> Json 
     }
 
 
-def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> Json:
+def _number_sources(kept: Mapping[str, Any]) -> Any:
+    """Return a number for the source of each row."""
+    numbers = np.zeros(len(kept["source"]), dtype=np.intp)
+    for name in _SOURCE_COLUMNS:
+        codes, values = pd.factorize(kept[name], use_na_sentinel=False)
+        numbers = numbers * len(values) + codes
+    return numbers
+
+
+def _take_rows(kept: Mapping[str, Any], rows: Any) -> Mapping[str, Any]:
+    return {name: values[rows] for name, values in kept.items()}
+
+
+def _pack_errors(kept: Mapping[str, Any], arrays: Arrays) -> Json:
     """Return the totals of each error with limits, and the shares of the variance by source."""
     errors = {}
-    for error in dict.fromkeys(kept["error"][of_axis].tolist()):
-        own = of_axis & (kept["error"] == error)
-        total = own & (kept["source"] == "total")
-        variance = kept["sigma"][total] ** 2
-        columns = (kept[name][total].tolist() for name in ("window", "time"))
-        places = {key: place for place, key in enumerate(zip(*columns, strict=True))}
-        rest = own & ~total
-        sources: dict[ErrorSource, Any] = {}
-        names = ("window", "time", "sigma", *(field.name for field in fields(ErrorSource)))
-        columns = (kept[name][rest].tolist() for name in names)
-        for window, time, sigma, *values in zip(*columns, strict=True):
-            place = places[window, time]
-            plain: Any = (None if isinstance(v, float) and isnan(v) else v for v in values)
-            source = ErrorSource(*plain)
-            if source not in sources:
-                sources[source] = np.zeros(len(variance))
-            sources[source][place] = sigma**2 / variance[place] if variance[place] else 0.0
-        errors[error] = {
-            **{name: arrays.log(kept[name][total]) for name in ("sigma", "lower", "upper")},
-            "gyro": _merge_axes(kept["gyro"][total]),
-            "accel": _merge_axes(kept["accel"][total]),
-            "sources": {
-                verdicts.source_text(source): {
+    for error in dict.fromkeys(kept["error"].tolist()):
+        own = _take_rows(kept, kept["error"] == error)
+        of_total = own["source"] == "total"
+        total, rest = _take_rows(own, of_total), _take_rows(own, ~of_total)
+        variance = total["sigma"] ** 2
+        keys = zip(total["window"].tolist(), total["time"].tolist(), strict=True)
+        places = {key: place for place, key in enumerate(keys)}
+        keys = zip(rest["window"].tolist(), rest["time"].tolist(), strict=True)
+        at = np.array([places[key] for key in keys], dtype=np.intp)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            parts = np.where(variance[at], rest["sigma"] ** 2 / variance[at], 0.0)
+        sources = {}
+        for number in pd.unique(rest["number"]):
+            rows = np.flatnonzero(rest["number"] == number)
+            shares = np.zeros(len(variance))
+            shares[at[rows]] = parts[rows]
+            if np.any(shares > 0.0):
+                values = (rest[name][rows[0]] for name in _SOURCE_COLUMNS)
+                plain: Any = (None if pd.isna(value) else value for value in values)
+                source = ErrorSource(*plain)
+                sources[verdicts.source_text(source)] = {
                     "kind": verdicts.source_text(source, sized=False),
-                    "shares": arrays.even(share),
+                    "shares": arrays.even(shares),
                 }
-                for source, share in sources.items()
-                if np.any(share > 0.0)
-            },
+        errors[error] = {
+            **{name: arrays.log(total[name]) for name in ("sigma", "lower", "upper")},
+            "gyro": _merge_axes(total["gyro"]),
+            "accel": _merge_axes(total["accel"]),
+            "sources": sources,
         }
     return errors
 

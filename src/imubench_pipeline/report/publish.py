@@ -28,6 +28,7 @@ from imubench_pipeline.report.models import make_models
 from imubench_pipeline.report.pages import ENTRIES, MADE, THEORY, list_pages, read_plotting_script
 from imubench_pipeline.report.palette import AXIS_STYLES, TERM_COLOURS
 from imubench_pipeline.report.practical import System, choose_page_unit, list_page_units
+from imubench_pipeline.report.processes import compute_in_order
 from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.report.search import make_search_index
 from imubench_pipeline.report.site import Page, Site
@@ -176,7 +177,9 @@ _SCRIPT_NAMES = (
 Progress = Callable[[str], None]
 
 
-def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
+def publish(
+    site: Site, folder: Path, say: Progress = lambda _: None, processes: int = 1
+) -> list[str]:
     """Write the pages of the report whose data changed, and remove obsolete ones.
 
     A page that fails is replaced by one with the reason, is named in `Site.failed`, and is made
@@ -206,13 +209,23 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         _put(folder, KEYS, _format_json(unchanged))
     templates = make_templates(site.system)
     shown = dict(unchanged)
-    for page in every:
-        if page.path not in unchanged:
-            say(page.path)
-            rendered = _make_page(site, templates, page).encode()
-            if page.path not in site.failed:
-                shown[page.path] = _make_key(page.key, rendered)
-            written += _put(folder, page.path, rendered)
+    changed = [page for page in every if page.path not in unchanged]
+
+    def make(place: int) -> tuple[bytes, str | None]:
+        rendered = _make_page(site, templates, changed[place]).encode()
+        return rendered, site.failed.get(changed[place].path)
+
+    # Pages of many recordings take longest.
+    entries = {entry.file for entry in site.existing}
+    longest = [place for place, page in enumerate(changed) if page.path in entries]
+    made = compute_in_order(make, len(changed), longest, processes)
+    for page, (rendered, failure) in zip(changed, made, strict=True):
+        say(page.path)
+        if failure is None:
+            shown[page.path] = _make_key(page.key, rendered)
+        else:
+            site.failed[page.path] = failure
+        written += _put(folder, page.path, rendered)
     existing = [file for of in _PAGE_FOLDERS for file in (folder / of).rglob("*.html")]
     existing += [file for entry in site.entries if (file := folder / entry.file).is_file()]
     for file in existing:

@@ -8,6 +8,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 from pandas.util import hash_array
 from scipy.special import chdtri
@@ -199,7 +200,8 @@ class RecordingView:
     @property
     def budget(self) -> list[ErrorBudgetRow]:
         """Errors of the recording after the times of the settings."""
-        return [row for row in self.rows(ErrorBudgetRow) if row.requirement is None]
+        part = self.parts[ErrorBudgetRow.table]
+        return ErrorBudgetRow.rows_of(part.filter(pc.is_null(part["requirement"])))
 
     def rows(self, of: type[R]) -> list[R]:
         """Return its rows of a table, by their class."""
