@@ -78,24 +78,30 @@ def test_the_page_is_written_again_when_what_is_kept_changes(tmp_path: Path) -> 
     assert publish(site(tables, tmp_path), tmp_path / "report") == []
 
 
-def test_of_many_recordings_whole_decades_are_kept(
+def test_of_many_recordings_the_longest_and_the_latest_are_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tables = joined(recording_rows("one", "day1"), recording_rows("two", "day1"))
-    put(tmp_path, "one", "day1")
-
-    def count() -> int:
-        (channel,) = (
-            one["drawn"]
-            for one in COMPARE.context(site(tables, tmp_path))["page"]["channels"]
-            if one["drawn"]
+    nights = [
+        recording_rows(
+            sensor,
+            f"night{night}",
+            started=f"2026-01-0{night}",
+            duration=99999.0 if night == 2 else 7200.0,
         )
-        page = COMPARE.context(site(tables, tmp_path))["page"]
-        return len(page["arrays"][channel["tau"]][3])
-
-    several = count()
-    monkeypatch.setattr("imubench_pipeline.report.compare._MAX_DETAILED_RECORDINGS", 1)
-    assert count() < several
+        for sensor in ("one", "two")
+        for night in range(1, 8)
+    ]
+    made = site(joined(*nights), tmp_path)
+    monkeypatch.setattr("imubench_pipeline.report.site._MAX_COMPARED", 8)
+    chosen = [(view.sensor, view.name) for view in made.select_compared(made.views)]
+    expected = ("night2", "night5", "night6", "night7")
+    assert chosen == [(sensor, night) for sensor in ("one", "two") for night in expected]
+    page = COMPARE.context(made)["page"]
+    assert [(one["sensor"], one["recording"]) for one in page["recordings"]] == chosen
+    start = made.existing[0].context(made)
+    assert start["latest"] and {one["recording"] for one in start["page"]["channels"]} == {
+        *expected
+    }
 
 
 def test_one_recording_is_not_compared(tmp_path: Path) -> None:

@@ -33,23 +33,19 @@ KEPT = ("error_growth", "drawn_deviations")
 
 _SOURCE_COLUMNS = tuple(field.name for field in fields(ErrorSource))
 _COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
-_MAX_DETAILED_RECORDINGS = 100
-"""With more recordings, draws are at whole decades of tau, and errors of worst axes only."""
-
 
 def _make_context(site: Site) -> Mapping[str, object]:
     views = _select_recordings(site)
     together = Comparison(site.compared(views), site.names)
     arrays, channels = together.arrays, together.channels
-    few = len(views) > _MAX_DETAILED_RECORDINGS
     recordings = []
     for view in views:
         kept = {table: _read_columns(_make_path(site, view, table)) for table in KEPT}
-        drawn = dict(_pack_draws(kept["drawn_deviations"], arrays, few=few))
+        drawn = dict(_pack_draws(kept["drawn_deviations"], arrays))
         for channel in channels:
             if (channel["sensor"], channel["recording"]) == view.full_name:
                 channel["drawn"] = drawn.get(channel["channel"])
-        growth = _pack_growth(kept["error_growth"], arrays, few=few)
+        growth = _pack_growth(kept["error_growth"], arrays)
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
@@ -101,8 +97,8 @@ def _describe_verdict(row: RankingRow) -> str:
 
 
 def _select_recordings(site: Site) -> list[RecordingView]:
-    """Return the static recordings, which can be compared."""
-    return [view for view in site.views if view.static]
+    """Return the static recordings, which can be compared; of many, the latest."""
+    return site.select_compared([view for view in site.views if view.static])
 
 
 def _make_path(site: Site, view: RecordingView, table: str) -> Path:
@@ -139,17 +135,13 @@ def _describe_recording(view: RecordingView) -> Json:
     }
 
 
-def _pack_draws(
-    kept: Mapping[str, Any], arrays: Arrays, *, few: bool
-) -> Iterator[tuple[str, Json]]:
+def _pack_draws(kept: Mapping[str, Any], arrays: Arrays) -> Iterator[tuple[str, Json]]:
     """Yield the Allan deviation of each channel and of its drawn models at some tau, sorted."""
     if not kept:
         return
     of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
-    decade = np.log10(kept["tau"])
-    wanted = np.abs(decade - decade.round()) < 1e-6 if few else np.ones(len(decade), dtype=bool)
     for channel in dict.fromkeys(kept["channel"].tolist()):
-        own = (kept["channel"] == channel) & wanted
+        own = kept["channel"] == channel
         best = own & ~of_draw
         unknown = [list(texts) for texts in kept["unknown"][best]]
         drawn = {
@@ -161,7 +153,7 @@ def _pack_draws(
         yield channel, drawn
 
 
-def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> Json | None:
+def _pack_growth(kept: Mapping[str, Any], arrays: Arrays) -> Json | None:
     """Return the growth of errors of the worst axes and of each axis."""
     if not kept or not len(kept["error"]):
         return None
@@ -170,10 +162,9 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> Json 
     by_axis = {
         axis: _pack_errors(_take_rows(kept, kept["axis"] == axis), arrays)
         for axis in dict.fromkeys(kept["axis"].tolist())
-        if axis == "worst" or not few
     }
     worst = by_axis.pop("worst")
-    only = {} if by_axis or few else dict.fromkeys({name[-1] for name in kept["gyro"]}, "worst")
+    only = {} if by_axis else dict.fromkeys({name[-1] for name in kept["gyro"]}, "worst")
     return {
         "windows": arrays.exact(windows),
         "times": arrays.exact(times),
@@ -246,6 +237,6 @@ COMPARE = Entry(
     files=lambda site: (
         _make_path(site, view, table) for view in _select_recordings(site) for table in KEPT
     ),
-    exists=lambda site: bool(_select_recordings(site)),
+    exists=lambda site: any(view.static for view in site.views),
 )
 """The page that compares two or more sensors or recordings that the reader chooses."""

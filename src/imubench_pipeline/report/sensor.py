@@ -65,7 +65,8 @@ def make_sensor_page(site: Site, sensor: str) -> Page:
 def _make_sensor_context(
     site: Site, sensor: str, own: Sequence[RecordingView]
 ) -> Mapping[str, object]:
-    together = Comparison(site.compared(own), site.names)
+    compared = site.select_compared(own)
+    together = Comparison(site.compared(compared), site.names)
     pooled = [
         row.columns()
         | {
@@ -122,6 +123,7 @@ def _make_sensor_context(
         },
         "budgets": list(meaning.make_budget_tables(budget, simulated, site.system)),
         "budget_words": meaning.explain_budget(site.settings["settings"]["error_budget"]),
+        "latest": len(compared) < len(own),
         "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
         "deltas": deltas,
         "repeated": list(
@@ -129,7 +131,7 @@ def _make_sensor_context(
         ),
         "page": {
             "grouped": "recording",
-            "recordings": [view.name for view in own],
+            "recordings": [view.name for view in compared],
             "looks": pack_styles({sensor: site.looks[sensor]})
             | {"places": [asdict(look) for look in make_recording_styles(site.looks[sensor])]},
             "names": site.names,

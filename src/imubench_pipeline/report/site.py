@@ -15,7 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from imubench_pipeline.model.comparisons import CoverageRow, DriftRow
+from imubench_pipeline.model.comparisons import CoverageRow, DriftRow, RankingRow
 from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report.comparison import ComparedRecording, gather_recording
@@ -44,6 +44,8 @@ _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _PACKAGE = "imubench_pipeline"
 _FIRST_ROWS = 100  # rows of a long table that are shown at first
 _PLAIN_ROWS = 30  # rows of a long table that are plain HTML, for readers without JavaScript
+_MAX_COMPARED = 100  # recordings on a page that compares, so that it opens fast
+_MIN_OF_SENSOR = 3  # but of each sensor at least so many
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 
@@ -192,6 +194,24 @@ class Site:
             if view.full_name not in self._compared:
                 self._compared[view.full_name] = gather_recording(view, self.system)
             yield self._compared[view.full_name]
+
+    def select_compared(self, views: Sequence[RecordingView]) -> list[RecordingView]:
+        """Return the recordings that a page compares: all, or the latest ones of each sensor.
+
+        Among them are the recordings that decide, and the longest one that may decide.
+        """
+        most = max(_MIN_OF_SENSOR, _MAX_COMPARED // max(1, len({view.sensor for view in views})))
+        deciding = {(row.sensor, row.recording) for row in self.rows(RankingRow) if row.decides}
+        by_sensor: dict[str, list[RecordingView]] = {}
+        for view in views:
+            by_sensor.setdefault(view.sensor, []).append(view)
+        chosen: set[Name] = set()
+        for own in by_sensor.values():
+            longest = max(own, key=lambda v: (v.row.decides is not False, v.row.duration or 0.0))
+            first = {longest.full_name, *(v.full_name for v in own if v.full_name in deciding)}
+            own.sort(key=lambda v: (v.full_name in first, v.row.started or ""), reverse=True)
+            chosen.update(view.full_name for view in own[:most])
+        return [view for view in views if view.full_name in chosen]
 
     def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
         """Return sensor and name of the recordings that have rows of a class."""

@@ -256,7 +256,8 @@ _LINE = 100  # characters of a reason that fit on one line
 
 def _start(site: Site) -> Mapping[str, object]:
     views = site.views
-    together = Comparison(site.compared(views), site.names)
+    compared = site.select_compared(views)
+    together = Comparison(site.compared(compared), site.names)
     warned = [view for view in views if view.warnings]
     by_name = {view.full_name: view for view in views}
     # Of the recordings in doubt, those with a warning that nobody expects.
@@ -296,6 +297,7 @@ def _start(site: Site) -> Mapping[str, object]:
         "forest": FOREST,
         "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
         "parameter_tables": list(together.tables()),
+        "latest": len(compared) < len(views),
         "sensors": {name: _describe_sensor(site, name) for name in site.sensors},
         "page": {
             "grouped": "sensor",
