@@ -116,10 +116,10 @@ def multiplied(results: Path, number: int) -> dict[str, pa.Table]:
     compared = {table: read(table, [kept / f"{table}.parquet"]) for table in COMPARED}
     for (sensor, recording), factor in zip(names, factors, strict=True):
         target = results / "recordings" / sensor / recording
-        target.mkdir(parents=True, exist_ok=True)
+        target.mkdir(parents=True)
         for path in kept.glob("*.parquet"):
             if path.stem in (*OF_ONE_RECORDING, "log"):
-                shutil.copyfile(path, target / path.name)
+                (target / path.name).hardlink_to(path)
         # Arrays that are alike stand in a page once.
         for table, one in compared.items():
             own = _copy(one, sensor, recording, 0, factor)

@@ -71,6 +71,7 @@ class Cell:
     other_margins: str  # of noise alone, and the likely one
     bar: tuple[float, float, float] | None  # of the margin and its limits, the places
     noise: float | None  # of the margin of noise alone, the place
+    likely: tuple[SourcedNumber, float] | None  # margin of a conditional verdict, and its place
     weak: str  # reasons for weak evidence
     doubts: str  # doubts about the recordings
     reason: str  # why it is not judged
@@ -124,6 +125,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
     for deciding in rows.values():
         drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
         drawn += [deciding.noise_margin]
+        drawn += [deciding.likely_margin] if deciding.verdict == "meets_if" else []
         drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
@@ -180,7 +182,7 @@ def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is not ranked."""
     reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
     verdict: Verdict = "not_enough_data"
-    unknown = (None, "", None, None, "", "")
+    unknown = (None, "", None, None, None, "", "")
     return Cell(requirement, sensor, verdict, 0, *unknown, reason, (), -math.inf)
 
 
@@ -220,6 +222,12 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         verdicts.other_margins_text(row) if judged else "",
         bar,
         scale.place(row.noise_margin) if judged and row.noise_margin is not None else None,
+        (
+            source_number(row, "likely_margin", numbers.number_text(row.likely_margin, 2)),
+            scale.place(row.likely_margin),
+        )
+        if row.verdict == "meets_if" and row.likely_margin is not None
+        else None,
         verdicts.evidence_text(row) if judged else "",
         verdicts.used_doubts_text(row),
         reason,
