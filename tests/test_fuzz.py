@@ -12,13 +12,13 @@ from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.conftest import few
+from tests.formats.test_ubx import raw, samples, truth
 from tests.fuzz import target
 from tests.fuzz.__main__ import main
 from tests.fuzz.held import FAULT, Input
 from tests.fuzz.inputs import READERS, seeds
 from tests.fuzz.mutations import mutated
 from tests.fuzz.supervision import HANG_S, Fuzzing
-from tests.readers.test_ubx import raw, samples, truth
 
 SECONDS = 1.0
 

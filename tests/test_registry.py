@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 from imubench_pipeline import registry
+from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.registry import FOLDER, Extension, Hook, installed_extensions
 from imubench_pipeline.report.site import Entry, RecordingPage, Section
 from imubench_pipeline.settings.command_line import Command
@@ -22,6 +23,7 @@ HOOKS: dict[str, type | None] = {  # None: a function
     "tables": ModuleType,
     "motions": None,
     "simulations": Simulation,
+    "formats": FileFormat,
     "limits": None,
     "sensor_tables": None,
     "commands": Command,
@@ -84,6 +86,7 @@ def test_an_extension_without_one_that_it_needs_is_left_out(
 @pytest.mark.parametrize(
     ("step", "file"),
     [
+        ("steps.ingest", "formats/rosbag/version_2.py"),
         ("steps.ranking", "aided/limits.py"),
         ("steps.simulate", "earth_rate/simulation.py"),
         ("steps.sensor_tables", "fusion/published_figures.py"),

@@ -46,6 +46,7 @@ class Extension:
     rules: str | None = None  # file of its rules for Snakemake
     motions: Mapping[str, str] = field(default_factory=dict)  # simulated ones, by their block
     simulations: Mapping[str, str] = field(default_factory=dict)  # of sensors, by their block
+    formats: Mapping[str, str] = field(default_factory=dict)  # of log files, by `reader`
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
     sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name

@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.corpus.entry import Entry, Rejected, Written, file, flipped, kept, part
 from tests.corpus.signals import RATE, ROWS, rest
-from tests.readers.test_rosbag import EPOCH, IMU, bag, imu_topic, message, temperature_topic
+from tests.formats.test_rosbag import EPOCH, IMU, bag, imu_topic, message, temperature_topic
 
 CHANNELS = {
     "gyro_x": {"column": "angular_velocity.x", "unit": "rad/s"},

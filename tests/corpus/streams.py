@@ -10,10 +10,10 @@ import numpy as np
 
 from tests.corpus.entry import Entry, Rejected, file, flipped, kept, part
 from tests.corpus.signals import RATE, ROWS, rest
-from tests.readers.flight_logs import dataflash, ulog
-from tests.readers.test_novatel import rawimus
-from tests.readers.test_ubx import NMEA, RTCM, meas, nav_pvt, raw, samples
-from tests.readers.test_vectornav import logged, sentence
+from tests.formats.flight_logs import dataflash, ulog
+from tests.formats.test_novatel import rawimus
+from tests.formats.test_ubx import NMEA, RTCM, meas, nav_pvt, raw, samples
+from tests.formats.test_vectornav import logged, sentence
 
 # -------------------------------------------------------------------------------------- UBX
 

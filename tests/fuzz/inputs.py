@@ -14,8 +14,8 @@ from pathlib import Path
 
 from tests.corpus import arrays, bags, exports, packed, scientific, stamps, streams, text
 from tests.corpus.entry import Entry, Kept, archive, kept
+from tests.formats.test_rosbag import KINDS
 from tests.fuzz.held import Input, files_in
-from tests.readers.test_rosbag import KINDS
 
 _LARGEST = 300_000
 _LINES, _BYTES, _MESSAGES = 60, 8000, 30

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
+from imubench_pipeline.extensions.formats.vectornav import FIELDS
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.readers.vectornav import FIELDS
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.settings.validation import parse
 from tests.conftest import few
+from tests.formats import test_rosbag, test_ubx, test_vectornav
 from tests.inspection.drafts import (
     NAMED,
     ROWS,
@@ -26,7 +27,7 @@ from tests.inspection.drafts import (
     saved,
     sensor_of,
 )
-from tests.readers import test_phone, test_rosbag, test_ubx, test_vectornav, test_xsens
+from tests.readers import test_phone, test_xsens
 
 
 @pytest.mark.parametrize("ticked", [True, False])

@@ -21,6 +21,7 @@ from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.inspection import inspect
 from tests.conftest import few
+from tests.formats import test_rosbag, test_ubx
 from tests.inspection.drafts import (
     NAMED,
     WRITERS,
@@ -33,7 +34,6 @@ from tests.inspection.drafts import (
     text,
     three,
 )
-from tests.readers import test_rosbag, test_ubx
 from tests.readers.array_files import damages as array_damages
 from tests.readers.damage import examples
 from tests.readers.test_text_hostile import FILES, LIKE

@@ -163,12 +163,12 @@ def test_a_format_that_is_declared_by_half_stops_the_import(tmp_path: Path) -> N
             ignore=shutil.ignore_patterns("*.nbi", "*.nbc"),
         )
     formats = f"{PACKAGE.name}/readers/formats"
-    (tmp_path / "module" / formats / "ubx.py").unlink()
-    text = (tmp_path / "name" / formats / "ubx.py").read_text()
+    (tmp_path / "module" / formats / "numpy.py").unlink()
+    text = (tmp_path / "name" / formats / "numpy.py").read_text()
     (tmp_path / "name" / formats / "other.py").write_text(text)
     folders = [str(tmp_path / folder) for folder in ("module", "name")]
     done = subprocess.run(
         [sys.executable, "-c", IMPORTS, *folders], capture_output=True, text=True, check=True
     )
-    for missing, said in zip(("ubx", "other"), done.stdout.splitlines(), strict=True):
+    for missing, said in zip(("numpy", "other"), done.stdout.splitlines(), strict=True):
         assert f"{missing}: a format of log files has a module in readers/formats" in said

@@ -9,7 +9,7 @@ import pytest
 
 from imubench_pipeline.readers import read
 from imubench_pipeline.settings.sensor import LogFormat
-from tests.readers import test_rosbag, test_ubx, test_vectornav
+from tests.formats import test_rosbag, test_ubx, test_vectornav
 
 GYRO = {"unit": "deg/s"}
 

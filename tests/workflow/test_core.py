@@ -10,7 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from imubench_pipeline.readers.other_formats import EXTENSION_MARKS
+from imubench_pipeline.registry import references
 from tests.conftest import PROJECT
+from tests.corpus import ENTRIES
+from tests.readers.test_formats import SAMPLES
 from tests.workflow.project import Project, linked, put_log, put_sensor
 
 WHAT_THERE_IS = """
@@ -25,6 +29,20 @@ assert not {"papers", "nightly"} & COMMANDS.keys()
 assert "earth_rate.html" not in [entry.file for entry in ENTRIES]
 assert "two_position" not in RecordingNotes.model_fields
 assert "calibration" not in TABLES
+"""
+
+READ = """
+import sys
+from pathlib import Path
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.content import find_format, recognise_content
+
+for reader, path in zip(sys.argv[1::2], map(Path, sys.argv[2::2]), strict=True):
+    for recognise in (recognise_content, lambda path: find_format(path, reader)):
+        try:
+            print(recognise(path))
+        except RecordingError as error:
+            print(error)
 """
 
 
@@ -48,6 +66,27 @@ def test_nothing_of_an_extension_is_left(core: Path) -> None:
     command = [sys.executable, "-c", WHAT_THERE_IS]
     done = subprocess.run(command, env=surroundings(core), cwd=core, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_log_of_an_extension_names_it(core: Path, tmp_path: Path) -> None:
+    arguments = []
+    for reader in EXTENSION_MARKS:
+        folder = tmp_path / reader
+        folder.mkdir()
+        arguments += [reader, str(ENTRIES[SAMPLES[reader]].write(folder))]
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    (bag / "metadata.yaml").touch()
+    command = [sys.executable, "-c", READ, *arguments, "rosbag", str(bag)]
+    done = subprocess.run(command, env=surroundings(core), cwd=core, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    readers = [reader for reader in [*EXTENSION_MARKS, "rosbag"] for _ in range(2)]
+    for reader, line in zip(readers, done.stdout.splitlines(), strict=True):
+        assert f"needs the reader '{reader}' of the extension 'formats'" in line
+
+
+def test_the_formats_of_the_extension_are_those_named_without_it() -> None:
+    assert references("formats").keys() == EXTENSION_MARKS.keys()
 
 
 @pytest.mark.release

@@ -7,7 +7,7 @@ from pathlib import Path
 from imubench_pipeline.readers import compressed
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
-from imubench_pipeline.readers.other_formats import find_other_format
+from imubench_pipeline.readers.other_formats import EXTENSION_MARKS, find_other_format
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -17,6 +17,8 @@ _ZIP_MAGIC = b"PK\x03\x04"
 
 def recognise_folder(path: Path) -> FileFormat | None:
     """Return the format of a folder that is one log, such as a ROS 2 bag; else None."""
+    if (path / "metadata.yaml").is_file():
+        _refuse_missing_extension(path, "rosbag")
     marks = ((found, found.signature.folder_has) for found in FILE_FORMATS.values())
     return next((found for found, mark in marks if mark and (path / mark).is_file()), None)
 
@@ -28,7 +30,10 @@ def is_endless(path: Path) -> bool:
 
 def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
     """Return the stated format of a file (``reader``), or else the one of its content."""
-    return recognise_content(path)[0] if stated is None else FILE_FORMATS[stated]
+    if stated is None:
+        return recognise_content(path)[0]
+    _refuse_missing_extension(path, stated)
+    return FILE_FORMATS[stated]
 
 
 def recognise_content(path: Path) -> tuple[FileFormat, str]:
@@ -82,8 +87,19 @@ def _name_compression(begin: bytes) -> str:
 
 def _refuse_other_format(path: Path, begin: bytes) -> None:
     """Raise `RecordingError` if a file is known from its first bytes, but not read."""
+    for reader, marks in EXTENSION_MARKS.items():
+        if begin.startswith(marks):
+            _refuse_missing_extension(path, reader)
     if (other := find_other_format(begin)) is not None:
         raise RecordingError(
             f"{path.name}: is {other.name}, which is not read; expected a format that 'imubench "
             f"formats' lists: {other.advice}"
+        )
+
+
+def _refuse_missing_extension(path: Path, reader: Reader) -> None:
+    if reader not in FILE_FORMATS:
+        raise RecordingError(
+            f"{path.name}: needs the reader {reader!r} of the extension 'formats', which is not "
+            "installed; expected its folder extensions/formats: install it, or log as text"
         )

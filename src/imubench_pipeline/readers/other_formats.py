@@ -1,6 +1,9 @@
 """Known files that are not read: their first bytes, and how to make a log of them."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
+
+from imubench_pipeline.settings.sensor import Reader
 
 
 class OtherFormat(NamedTuple):
@@ -46,6 +49,16 @@ OTHER_FORMATS = tuple(OtherFormat(*row) for row in (
     ("a program", (b"\x7fELF", b"MZ\x90\0", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"), _LOG),
 ))  # fmt: skip
 """Neither text nor a format of `imubench_pipeline.readers.formats` begins with these marks."""
+
+EXTENSION_MARKS: Mapping[Reader, tuple[bytes, ...]] = {
+    "vectornav": (b"$VN",),
+    "ubx": (b"\xb5\x62",),
+    "novatel": (b"%RAWIMU", b"#RAWIMU"),
+    "ulog": (b"ULog\x01\x12\x35",),
+    "dataflash": (b"\xa3\x95\x80\x80",),
+    "rosbag": (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0"),
+}
+"""The readers of the extension ``formats`` and their files, for the error where it is missing."""
 
 
 def find_other_format(begin: bytes) -> OtherFormat | None:

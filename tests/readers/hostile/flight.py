@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
-from tests.readers.flight_logs import data, declared, fmt, message, subscribed, ulog_header
+from tests.formats.flight_logs import data, declared, fmt, message, subscribed, ulog_header
 from tests.readers.hostile.attack import Attack, file
 from tests.readers.test_excel import workbook
 

@@ -8,8 +8,8 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
+from imubench_pipeline.extensions.formats.flight.messages import Kind, MessageFile, Messages
 from imubench_pipeline.readers.bounds import MAX_TOPICS, MAX_ULOG_FIELDS
-from imubench_pipeline.readers.flight.messages import Kind, MessageFile, Messages
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAGIC, _HEADER_BYTES = b"ULog\x01\x12\x35", 16

@@ -21,11 +21,11 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
+from imubench_pipeline.extensions.formats.rosbag.version_1 import Bag
+from imubench_pipeline.extensions.formats.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import MAX_MESSAGE_BATCH
-from imubench_pipeline.readers.rosbag.version_1 import Bag
-from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.stamps import Clock, format_date
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files

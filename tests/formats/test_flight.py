@@ -15,7 +15,7 @@ from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.settings.sensor import CHANNELS, LogFormat
-from tests.readers import flight_logs as made
+from tests.formats import flight_logs as made
 
 ROWS = 1500
 Columns = dict[str, np.ndarray]

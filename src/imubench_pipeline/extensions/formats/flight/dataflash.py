@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from imubench_pipeline.readers.flight.messages import Kind, MessageFile, Messages
+from imubench_pipeline.extensions.formats.flight.messages import Kind, MessageFile, Messages
 
 _SYNC = b"\xa3\x95"
 _FMT, _FMT_BYTES = 0x80, 89

@@ -24,11 +24,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.extensions.formats.ubx_frames import Frames
 from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.compressed import blocks
 from imubench_pipeline.readers.stamps import WrapState, unwrap
-from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings.files import IncompleteLastRecord, WrongChecksum
 

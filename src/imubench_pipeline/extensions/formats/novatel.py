@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.extensions.formats.vectornav import parse_fields
 from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.stamps import Clock
 from imubench_pipeline.readers.text.complete_lines import CompleteLines
-from imubench_pipeline.readers.vectornav import parse_fields
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imubench_pipeline.extensions.formats.novatel import compute_crc
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.readers.novatel import compute_crc
 from imubench_pipeline.settings.sensor import LogFormat
 
 # What a receiver with an HG1700 AG58 wrote, as published.

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyubx2 import GET, UBXMessage, UBXReader
 
-from imubench_pipeline.readers import RecordingError, read, ubx
+from imubench_pipeline.extensions.formats import ubx
+from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples

@@ -16,11 +16,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
+from imubench_pipeline.extensions.formats.rosbag import file as bags
+from imubench_pipeline.extensions.formats.rosbag.file import RosbagFile
+from imubench_pipeline.extensions.formats.rosbag.version_1 import Bag
 from imubench_pipeline.readers import RecordingError, bounds, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.rosbag import file as bags
-from imubench_pipeline.readers.rosbag.file import RosbagFile
-from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import examples
 

@@ -14,9 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from imubench_pipeline.extensions.formats.vectornav import (
+    FIELDS,
+    Sentences,
+    VectorNavFile,
+    verify_checksums,
+)
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.vectornav import FIELDS, Sentences, VectorNavFile, verify_checksums
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples
 
