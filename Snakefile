@@ -12,7 +12,7 @@ for file in files_of("rules"):  # of extensions
 
 
 include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortlist, fusion
-include: "workflow/rules/report.smk"  # what is read: pages and figures
+include: "workflow/rules/report.smk"  # what is read: pages
 
 
 # What is missing or not as it was left is asked for by name: Snakemake takes away what a failed step
@@ -20,7 +20,6 @@ include: "workflow/rules/report.smk"  # what is read: pages and figures
 rule all:
     input:
         rules.report.output,
-        rules.figures.output,
         ADDED_OUTPUTS,
         made_again,
     localrule: True

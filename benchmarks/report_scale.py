@@ -25,12 +25,12 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
+from imubench_pipeline.extensions.figures.figures import list_drawings
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import make_site, publish
-from imubench_pipeline.report.static_figures.files import draw_comparison
 from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory
@@ -205,7 +205,8 @@ def main() -> None:
 
         timed(f"{given.recordings} recordings x {len(CHANNELS)} channels")
         start = time.perf_counter()
-        draw_comparison(tables, "practical", report / "figures")
+        for draw in list_drawings(tables, "practical", report / "figures"):
+            draw()
         print(f"figures for print, a step of their own: {time.perf_counter() - start:.1f} s")
         files = [path for path in report.rglob("*") if path.is_file()]
         size = sum(path.stat().st_size for path in files) / 1e6

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 import yaml
 
+from imubench_pipeline.extensions.figures import figures as static_files
 from imubench_pipeline.report import publish
-from imubench_pipeline.report.static_figures import files as static_files
 from imubench_pipeline.run.analysis import chain, compilation
 from imubench_pipeline.run.analysis.project import Stated, UnfilledError, lay_out
 from imubench_pipeline.run.cli import main

@@ -88,7 +88,7 @@ def test_the_report_is_made_again_when_its_texts_change(
     file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = provenance._PACKAGE / "report" / file
-    of_figures = "report.static_figures.files"
+    of_figures = "extensions.figures.figures"
     before = digest_sources("report.publish"), digest_sources("allan", of_figures)
     whole = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == path))

@@ -26,6 +26,7 @@ HOOKS: dict[str, type | None] = {  # None: a function
     "formats": FileFormat,
     "limits": None,
     "sensor_tables": None,
+    "figures": None,
     "commands": Command,
     "library": None,
     "listings": None,

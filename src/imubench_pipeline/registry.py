@@ -49,6 +49,7 @@ class Extension:
     formats: Mapping[str, str] = field(default_factory=dict)  # of log files, by `reader`
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
     sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
+    figures: Mapping[str, str] = field(default_factory=dict)  # for print, by their use
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
     library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
     sensor_commands: tuple[str, ...] = ()  # on the page of a sensor

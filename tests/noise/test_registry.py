@@ -11,6 +11,7 @@ import yaml
 
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
 from imubench_pipeline.estimators.model_choice import CANDIDATE_MODELS
+from imubench_pipeline.extensions.figures.style import SYMBOLS
 from imubench_pipeline.model.states import NoiseSource
 from imubench_pipeline.navigation.verdicts.judgement import PARAMETERS_OF_SOURCE
 from imubench_pipeline.noise import (
@@ -27,8 +28,8 @@ from imubench_pipeline.noise import (
     terms,
 )
 from imubench_pipeline.noise.terms.base import register_terms
+from imubench_pipeline.report.palette import TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.report.practical import choose_page_unit
-from imubench_pipeline.report.static_figures.style import SYMBOLS, TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.words.findings import FINDINGS
@@ -124,7 +125,7 @@ def test_a_model_holds_it_once(kind: type[Term]) -> None:
 
 @pytest.mark.parametrize("kind", TERMS)
 def test_pages_know_it(kind: type[Term]) -> None:
-    assert kind.symbol in TERM_LOOKS, f"TERM_LOOKS of report/static_figures/style.py lacks {kind}"
+    assert kind.symbol in TERM_LOOKS, f"TERM_LOOKS of report/palette.py lacks {kind}"
     for quantity in ("gyro", "accel"):
         assert "{" not in TERM_NAMES[quantity][kind.symbol]
     symbols = [one.symbol for one in kind.parameters]

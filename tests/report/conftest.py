@@ -3,6 +3,7 @@ from functools import cache
 
 import pytest
 
+from imubench_pipeline.extensions.figures import figures
 from imubench_pipeline.report import pages, site
 from imubench_pipeline.report import publish as publishing
 
@@ -10,7 +11,8 @@ ONCE = {
     (module, name): cache(getattr(module, name))
     for module, names in {
         publishing: ("make_templates", "digest_sources"),
-        pages: ("draw_theory_figure", "encode_figure", "version"),
+        pages: ("version",),
+        figures: ("encode_theory",),
         site: ("version",),
     }.items()
     for name in names
@@ -33,7 +35,6 @@ def _once() -> Iterator[None]:
 def small_report() -> Iterator[None]:
     """What is large and the same in every report is left out."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pages, "encode_figure", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
-        patch.setattr(pages, "draw_theory_figure", lambda system: None)
+        patch.setattr(figures, "encode_theory", lambda system: "data:image/svg+xml;base64,PHN2Zy8+")
         patch.setattr(publishing, "read_plotting_script", lambda: "var Plotly = {};")
         yield

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.extensions.figures import figures as static_files
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.report.static_figures import files as static_files
 from imubench_pipeline.run.cli import main
 from tests.report.pages import Read
 from tests.report.tables import joined, put_samples, put_tables, recording_rows, rejected_rows, site
@@ -78,7 +78,7 @@ def test_a_report_elsewhere_has_the_same_pages_and_the_figures_for_print(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr(static_files, "draw_comparison", lambda *given: drawn.append(given))
+    monkeypatch.setattr(static_files, "list_drawings", lambda *given: [lambda: drawn.append(given)])
     folder = tmp_path / "on the desk"
     assert main(["report", str(results), "--output", str(folder)]) == 0
     assert said(capsys)[0].startswith(f"{folder}/index.html: ")

@@ -15,8 +15,8 @@ import pyarrow.compute as pc
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.extensions.figures import figures
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.report import pages
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.folder import count_attempt, read_failed_pages
 from imubench_pipeline.report.pages import list_pages
@@ -62,8 +62,7 @@ MADE = publishing._make_page
 def _quick() -> Iterator[None]:
     """What is large and the same in every report is made by the tests of the command alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pages, "encode_figure", lambda figure: THEORY_FIGURE)
-        patch.setattr(pages, "draw_theory_figure", lambda system: None)
+        patch.setattr(figures, "encode_theory", lambda system: THEORY_FIGURE)
         patch.setattr(publishing, "read_plotting_script", lambda: PLOTTING)
         patch.setattr(publishing, "digest_sources", lambda *modules: "code")
         yield

@@ -1,4 +1,4 @@
-"""What is read: the pages of the report, and figures for print."""
+"""What is read: the pages of the report."""
 
 
 rule report:
@@ -27,22 +27,3 @@ rule report:
         pages_attempt=count_attempt(plan.run.results / "report"),
     script:
         "../scripts/report.py"
-
-
-rule figures:
-    input:
-        recordings=table("recordings"),
-        allan=table("allan"),
-        parameters=table("parameters"),
-        simulated_truth=table("simulated_truth"),
-    output:
-        folder=directory(RESULTS + "/report/figures"),
-    log:
-        LOGS + "/figures.log",
-    resources:
-        **cost(Cost(memory=350, memory_of_each=3, time=12, time_of_each=0.06)),
-    params:
-        settings=plan.figures_settings(),
-        code=plan.code("figures"),
-    script:
-        "../scripts/figures.py"

@@ -95,7 +95,7 @@ def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour
 
 def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
     """Draw a measured curve, the terms of a model, and their sum."""
-    from imubench_pipeline.report.static_figures.style import SUM_LOOK, TERM_LOOKS, TERM_NAMES
+    from imubench_pipeline.report.palette import SUM_LOOK, TERM_LOOKS, TERM_NAMES
 
     unit = choose_deviation_unit(quantity)
     draw_measured(axes, curve, unit, "log, 95 % limits", "black")

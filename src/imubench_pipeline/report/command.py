@@ -3,17 +3,24 @@
 import argparse
 import os
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imubench_pipeline.registry import Hook
 from imubench_pipeline.report.folder import is_report, list_report_files
 from imubench_pipeline.settings.command_line import CommandError
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from imubench_pipeline.report.practical import System
     from imubench_pipeline.report.site import Site
+
+_FIGURES: Hook[Callable[..., Sequence[Callable[[], None]]]] = Hook("figures")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,10 +72,17 @@ def run(arguments: argparse.Namespace) -> int:
     return int(bool(site.failed))
 
 
+def list_drawings(
+    tables: "Mapping[str, pa.Table]", system: "System", folder: Path, **kinds: Sequence[str]
+) -> Sequence[Callable[[], None]]:
+    """Return functions that write the figures for print; none without their extension."""
+    drawings = _FIGURES.by_key().get("comparison")
+    return drawings(tables, system, folder, **kinds) if drawings else ()
+
+
 def _write(site: "Site", arguments: argparse.Namespace) -> None:
     """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import publish, remove_old_pages, render_one_file
-    from imubench_pipeline.report.static_figures.files import draw_comparison
     from imubench_pipeline.tables.seals import seal_again
 
     if arguments.one_file is not None:
@@ -86,6 +100,7 @@ def _write(site: "Site", arguments: argparse.Namespace) -> None:
         folder = output.path
         with output.filling() as made:
             written = publish(site, made, say, os.cpu_count() or 1)
-            draw_comparison(site.tables, site.system, made / "figures")
+            for draw in list_drawings(site.tables, site.system, made / "figures"):
+                draw()
             remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")

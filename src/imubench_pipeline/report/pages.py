@@ -2,17 +2,16 @@
 
 import platform
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import distribution, version
 from pathlib import Path
 
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import catalogue, compare, recording, shortlist, start
 from imubench_pipeline.report.glossary import read_glossary
+from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.sensor import make_device_page, make_sensor_page
 from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site, make_command
-from imubench_pipeline.report.static_figures.curves import draw_theory_figure
-from imubench_pipeline.report.static_figures.files import encode_figure
 
 _SHIPPED_SCRIPT = Path(__file__).with_name("static") / "plotly.min.js"
 _FACTORY_START = ": this, () => {"
@@ -45,8 +44,12 @@ def _find_script() -> Path:
     return Path(str(distribution("plotly").locate_file("plotly/package_data/plotly.min.js")))
 
 
+_FIGURES: Hook[Callable[[System], str]] = Hook("figures")
+
+
 def _describe_theory(site: Site) -> Mapping[str, object]:
-    return {"figure": encode_figure(draw_theory_figure(site.system)), "terms": read_glossary()}
+    draw = _FIGURES.by_key().get("theory")
+    return {"figure": draw and draw(site.system), "terms": read_glossary()}
 
 
 THEORY = Entry(

@@ -5,6 +5,9 @@ pages and dark ones lightened on dark pages, for a contrast of 3 : 1 with the ba
 """
 
 from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.noise import TERMS
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,32 @@ METHOD_STYLES = {
     "authors": Appearance("#7A4B3A", "#C69A88", "7px,3px,2px,3px,2px,3px", "circle"),
 }
 """The appearance of each estimation method."""
+
+Look = dict[str, Any]
+"""Keyword arguments of Matplotlib for the look of a line or marker."""
+
+TERM_LOOKS: dict[str, Look] = {
+    "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
+    "N": {"color": "#0072B2", "linestyle": (0, (4, 2))},
+    "F": {"color": "#D55E00", "linestyle": (0, (5, 1.5, 1, 1.5))},
+    "GM": {"color": "#D55E00", "linestyle": (0, (5, 1.5))},
+    "K": {"color": "#B3508C", "linestyle": (0, (8, 2))},
+    "R": {"color": "#7A4B3A", "linestyle": (0, (8, 2, 1, 2))},
+    "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
+}
+"""Colour and dash of each term in all figures of Matplotlib."""
+
+SUM_LOOK: Look = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
+
+_QUANTITY_WORDS = {
+    "gyro": {"signal": "rate", "integral": "angle"},
+    "accel": {"signal": "acceleration", "integral": "velocity"},
+}
+TERM_NAMES = {
+    quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
+    for quantity, words in _QUANTITY_WORDS.items()
+}
+"""Standard names of the terms, by quantity and symbol of the term."""
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:

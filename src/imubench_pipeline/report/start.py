@@ -12,6 +12,7 @@ from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.navigation.suitability import PASSING_VERDICTS
+from imubench_pipeline.registry import references
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.meaning import (
     Group,
@@ -303,7 +304,7 @@ def _start(site: Site) -> Mapping[str, object]:
         "rankings": list(_list_rankings(site)),
         "next_steps": list(_list_next_steps(site)),
         "forest": FOREST,
-        "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
+        "twins": [(c, c.replace("_", " ")) for c in site.channel_names if references("figures")],
         "parameter_tables": list(together.tables()),
         "latest": len(compared) < len(views),
         "sensors": {name: _describe_sensor(site, name) for name in site.sensors},

@@ -19,7 +19,6 @@ from pydantic import BaseModel
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
-from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import convert_command as conversion
 from imubench_pipeline.run import demo_command as demo
 from imubench_pipeline.run import formats_command as formats
@@ -399,12 +398,6 @@ COMMANDS = {
         report.add_arguments,
         report.run,
         ("written", "", command_line.NO_RESULTS),
-    ),
-    "figures": command_line.Command(
-        "draw the figures of channels for print",
-        figures.add_arguments,
-        figures.run,
-        ("drawn", "", command_line.NO_RESULTS),
     ),
     "simulate": command_line.Command(
         "write a simulated log of a sensor, to test filters on",

@@ -414,10 +414,6 @@ class Plan:
             }
         )
 
-    def figures_settings(self) -> str:
-        """Return the settings of the figures of all sensors."""
-        return to_json({"report": {"units": self.run.report.units}})
-
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""
         return self._sensor_files(self.sensors, more)

@@ -9,8 +9,8 @@ from urllib.parse import unquote
 import pytest
 from playwright.sync_api import Browser
 
+from imubench_pipeline.extensions.figures.figures import list_cross_figures
 from imubench_pipeline.report.payload import FOREST
-from imubench_pipeline.report.static_figures.files import list_cross_figures
 from imubench_pipeline.report.view import gather_recordings
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.conftest import few

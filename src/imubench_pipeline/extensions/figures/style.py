@@ -14,12 +14,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.noise import PARAMETERS, TERMS
-from imubench_pipeline.report.palette import Appearance
+from imubench_pipeline.noise import PARAMETERS
+from imubench_pipeline.report.palette import Appearance, Look
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
-
-Look = dict[str, Any]
-"""Keyword arguments of Matplotlib for the look of a line or marker."""
 
 SINGLE, DOUBLE = 88.0, 180.0
 """Widths of one and of two columns of a journal, mm."""
@@ -96,29 +93,6 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
 }
 _MARKERS = {"circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v"}
 _MARKERS |= {"cross": "P", "x": "X", "star": "*"}
-
-TERM_LOOKS: dict[str, Look] = {
-    "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
-    "N": {"color": "#0072B2", "linestyle": (0, (4, 2))},
-    "F": {"color": "#D55E00", "linestyle": (0, (5, 1.5, 1, 1.5))},
-    "GM": {"color": "#D55E00", "linestyle": (0, (5, 1.5))},
-    "K": {"color": "#B3508C", "linestyle": (0, (8, 2))},
-    "R": {"color": "#7A4B3A", "linestyle": (0, (8, 2, 1, 2))},
-    "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
-}
-"""Colour and dash of each term, the same in every figure."""
-
-SUM_LOOK: Look = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
-
-_QUANTITY_WORDS = {
-    "gyro": {"signal": "rate", "integral": "angle"},
-    "accel": {"signal": "acceleration", "integral": "velocity"},
-}
-TERM_NAMES = {
-    quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
-    for quantity, words in _QUANTITY_WORDS.items()
-}
-"""Standard names of the terms, by quantity and symbol of the term."""
 
 
 def _set(symbol: str) -> str:

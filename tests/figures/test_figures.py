@@ -15,14 +15,12 @@ from matplotlib.text import Text
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
-from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
-from imubench_pipeline.report.practical import choose_page_unit
-from imubench_pipeline.report.static_figures.comparison import (
+from imubench_pipeline.extensions.figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
     make_marks,
 )
-from imubench_pipeline.report.static_figures.curves import (
+from imubench_pipeline.extensions.figures.curves import (
     CHARACTERISTIC,
     draw_allan_figure,
     draw_datasheet_figure,
@@ -31,11 +29,13 @@ from imubench_pipeline.report.static_figures.curves import (
     draw_terms_figure,
     draw_theory_figure,
 )
-from imubench_pipeline.report.static_figures.files import (
+from imubench_pipeline.extensions.figures.figures import (
     list_channel_figures,
     list_cross_figures,
     save,
 )
+from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
+from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.tables.files import write

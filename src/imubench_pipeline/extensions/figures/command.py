@@ -11,14 +11,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.settings.command_line import CommandError, add_units
+from imubench_pipeline.settings.command_line import NO_RESULTS, Command, CommandError, add_units
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 from imubench_pipeline.tables.schemas import TABLES
 
 if TYPE_CHECKING:
-    from imubench_pipeline.report.static_figures.files import Make
+    from imubench_pipeline.extensions.figures.figures import Make
 
 NEEDED = ("recordings", "allan", "parameters")
 """The tables that every figure needs; the others are optional."""
@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
     # Matplotlib is loaded only if there is something to draw.
     with require_extra("workflow", "draw figures"):
-        from imubench_pipeline.report.static_figures.files import save
+        from imubench_pipeline.extensions.figures.figures import save
 
     # The figures that were drawn beside the tables before are drawn again.
     own = OutputFolder(arguments.results / "figures", is_earlier=lambda _: True)
@@ -151,8 +151,8 @@ def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> "Iterator[tuple[str, Make]]":
     """Yield name and maker of each selected figure."""
-    from imubench_pipeline.report.static_figures import files
-    from imubench_pipeline.report.static_figures.curves import draw_theory_figure
+    from imubench_pipeline.extensions.figures import figures as files
+    from imubench_pipeline.extensions.figures.curves import draw_theory_figure
     from imubench_pipeline.report.view import gather_recordings
 
     cross = [kind for kind in arguments.kind if kind in files.CROSS_KINDS]
@@ -171,3 +171,8 @@ def _list_figures(
     for number, view in enumerate(views if of_channel else [], start=1):
         print(f"channel {number} of {len(views)}: {view.label} {view.channel}", file=sys.stderr)
         yield from files.list_channel_figures(view, arguments.units, kinds=of_channel)
+
+
+COMMAND = Command(
+    "draw the figures of channels for print", add_arguments, run, ("drawn", "", NO_RESULTS)
+)

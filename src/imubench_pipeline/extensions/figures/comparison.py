@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.extensions.figures import style
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_page_unit
-from imubench_pipeline.report.static_figures import style
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import status_text
 

@@ -3,18 +3,18 @@
 import base64
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
 from matplotlib.figure import Figure
 
+from imubench_pipeline.extensions.figures import comparison, curves
+from imubench_pipeline.extensions.figures.style import set_style
 from imubench_pipeline.report.practical import System
-from imubench_pipeline.report.static_figures import comparison, curves
-from imubench_pipeline.report.static_figures.style import set_style
 from imubench_pipeline.report.view import ChannelView, gather_recordings
-from imubench_pipeline.tables.files import make_schema, replace_file
+from imubench_pipeline.tables.files import make_folder, make_schema, read, replace_file
 from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Make = Callable[[], Figure | None]
@@ -68,10 +68,13 @@ def list_channel_figures(
         yield name, partial(CHANNEL_KINDS[kind], view, system)
 
 
-def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
-    """Write the figures of each channel of all sensors as SVG and PDF; missing tables are empty."""
-    for draw in list_drawings(tables, system, folder):
-        draw()
+def write_figures(tables: Iterable[Path], system: System, figures: Path) -> None:
+    """Write a folder of figures of each channel of all sensors; all appear together."""
+    with make_folder(figures) as folder:
+        for draw in list_drawings(
+            {file.stem: read(file.stem, [file]) for file in tables}, system, folder
+        ):
+            draw()
 
 
 def list_drawings(
@@ -81,7 +84,7 @@ def list_drawings(
     *,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Sequence[Callable[[], None]]:
-    """Return a function for each figure of all sensors that writes it."""
+    """Return a function for each figure that writes it as SVG and PDF; missing tables are empty."""
     folder.mkdir(parents=True, exist_ok=True)
     unused = {name: make_schema(name).empty_table() for name in BY_RECORDING}
     views = gather_recordings(unused | dict(tables))
@@ -105,9 +108,10 @@ def save(figure: Figure, path: Path) -> None:
         temporary.write_bytes(_write_bytes(figure, path.suffix[1:]))
 
 
-def encode_figure(figure: Figure) -> str:
-    """Return a figure as SVG in a data URI, for use in a page."""
-    return "data:image/svg+xml;base64," + base64.b64encode(_write_bytes(figure, "svg")).decode()
+def encode_theory(system: System) -> str:
+    """Return the characteristic curve as SVG in a data URI, for use in a page."""
+    figure = _write_bytes(curves.draw_theory_figure(system), "svg")
+    return "data:image/svg+xml;base64," + base64.b64encode(figure).decode()
 
 
 def _write_bytes(figure: Figure, kind: str) -> bytes:

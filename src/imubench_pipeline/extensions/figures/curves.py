@@ -10,17 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from imubench_pipeline.datasheets.class_limits import read_grade_limits
-from imubench_pipeline.noise import FLOOR, NoiseModel, Term
-from imubench_pipeline.report.palette import METHOD_STYLES
-from imubench_pipeline.report.practical import System, choose_page_unit
-from imubench_pipeline.report.static_figures.style import (
+from imubench_pipeline.extensions.figures.style import (
     GRADE_SHADES,
     MEASURED,
     SINGLE,
-    SUM_LOOK,
     SYMBOLS,
-    TERM_LOOKS,
-    TERM_NAMES,
     compute_limits,
     convert_line_style,
     draw_legend_below,
@@ -33,6 +27,9 @@ from imubench_pipeline.report.static_figures.style import (
     set_style,
     write_title,
 )
+from imubench_pipeline.noise import FLOOR, NoiseModel, Term
+from imubench_pipeline.report.palette import METHOD_STYLES, SUM_LOOK, TERM_LOOKS, TERM_NAMES
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 from imubench_pipeline.words.estimates import status_text
 from imubench_pipeline.words.numbers import NO_VALUE
