@@ -38,6 +38,7 @@ from imubench_pipeline.extensions.calibration.experiment import Dwell, Experimen
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.rate_table import RateTable
 from imubench_pipeline.extensions.calibration.schedule import Schedule
+from imubench_pipeline.extensions.calibration.sigma_range import sigma_range
 from imubench_pipeline.extensions.calibration.still import StillRun
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
@@ -46,7 +47,6 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.sigma_range import sigma_range
 
 Array = NDArray[np.float64]
 

@@ -56,7 +56,8 @@ PUBLIC = ["units",
           "report/practical", "report/publish", "report/site",
           "report/view",
           "extensions/earth_rate/earth_rotation",
-          "extensions/exports/exports", "extensions/fusion/fusion", "steps/noise_source",
+          "extensions/exports/exports", "extensions/fusion/fusion",
+          "extensions/calibration/noise_source",
           "steps/shortlist",
           "run/resources"]  # fmt: skip
 

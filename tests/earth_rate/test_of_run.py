@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from imubench_pipeline.extensions.calibration.noise_source import take_static_noise
 from imubench_pipeline.extensions.earth_rate.tables import TURNED
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
-from imubench_pipeline.steps.noise_source import take_static_noise
 from imubench_pipeline.tables.files import build
 from tests.earth_rate.recordings import (
     EVERY_30,

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.extensions.exports import reasons as exports
 from imubench_pipeline.words import reasons
 from imubench_pipeline.words.reasons import (
     budgets,
     curves,
     datasheets,
     estimates,
-    exports,
     files,
     pools,
     simulations,
@@ -244,7 +244,7 @@ EXAMPLES = [
 MODULES = [
     import_module(f"{reasons.__name__}.{found.name}")
     for found in pkgutil.iter_modules(reasons.__path__)
-]
+] + [exports]
 CONSTANTS = [
     value
     for module in MODULES

@@ -1,10 +1,11 @@
 """Load ingested samples; refuse altered ones."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -148,3 +149,17 @@ def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return `load_logs` of a sensor at rest; empty for a turned sensor."""
     logs = load_logs(folder)
     return logs if was_at_rest(folder) else {}
+
+
+def find_static_recordings(
+    folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
+) -> list[tuple[RecordingRow, Path]]:
+    """Return the usable static recordings in `folders`: the least `far`, then the longest."""
+
+    def order(recording: tuple[RecordingRow, Path]) -> tuple[Any, ...]:
+        row = recording[0]
+        return *far(row), -(row.duration or 0.0), row.recording
+
+    every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
+    usable = [kept for kept in every if (kept[0].kind, kept[0].status) == ("static", "ok")]
+    return sorted(usable, key=order)

@@ -49,7 +49,7 @@ from imubench_pipeline.model.estimates import AllanRow, LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.recordings.kept import load_static_logs
+from imubench_pipeline.recordings.kept import find_static_recordings, load_static_logs
 from imubench_pipeline.settings.requirements import Trajectory
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -57,7 +57,6 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
 from imubench_pipeline.simulate.models import make_imu_model
-from imubench_pipeline.steps.noise_source import find_static_recordings
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_difference, parse_quantity

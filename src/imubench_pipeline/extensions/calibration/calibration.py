@@ -18,6 +18,13 @@ from imubench_pipeline.extensions.calibration.least_squares import (
     NotObservable,
     NotObservableError,
 )
+from imubench_pipeline.extensions.calibration.noise_source import (
+    NO_MODEL,
+    NoiseSource,
+    explain_segments,
+    find_noise_source,
+    take_printed_noise,
+)
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.extensions.calibration.schedule import Schedule
@@ -42,13 +49,6 @@ from imubench_pipeline.recordings.kept import load_logs
 from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.noise_source import (
-    NO_MODEL,
-    NoiseSource,
-    explain_segments,
-    find_noise_source,
-    take_printed_noise,
-)
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity

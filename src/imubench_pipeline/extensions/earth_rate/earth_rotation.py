@@ -12,6 +12,12 @@ from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
+from imubench_pipeline.extensions.calibration.noise_source import (
+    NO_MODEL,
+    NoiseSource,
+    explain_segments,
+    find_noise_source,
+)
 from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
@@ -46,12 +52,6 @@ from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, re
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import make_axis_model
-from imubench_pipeline.steps.noise_source import (
-    NO_MODEL,
-    NoiseSource,
-    explain_segments,
-    find_noise_source,
-)
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity

@@ -33,9 +33,9 @@ from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow, EarthRa
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.kept import find_static_recordings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
-from imubench_pipeline.steps.noise_source import find_static_recordings
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity

@@ -28,13 +28,13 @@ from imubench_pipeline.extensions.calibration.experiment import (
     block_means,
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
+from imubench_pipeline.extensions.calibration.sigma_range import sigma_range
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
 
 GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"]}

@@ -148,9 +148,9 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
 def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
     """Yield what a file holds: its mode, and the values of gyro and accelerometer."""
     from imubench_pipeline.extensions.exports.mapping import map_to_family
+    from imubench_pipeline.extensions.exports.reasons import value_kind
     from imubench_pipeline.extensions.exports.targets import TARGETS
     from imubench_pipeline.report.practical import choose_page_unit
-    from imubench_pipeline.words.reasons.exports import value_kind
 
     target = TARGETS[options.target]
     yield f"{options.output.path}: for {target.program}"

@@ -9,12 +9,12 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import CURVE, Estimate
 from imubench_pipeline.estimators.rows import make_estimate
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import AXES, AxisNoise, ExportError
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import join_names
-from imubench_pipeline.words.reasons import exports as texts
 
 _Estimated = tuple[str, str, str]  # recording, channel, method
 _Ranked = tuple[float, _Estimated, Estimate]  # by the Allan deviation at the horizon

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.words.numbers import number_text, percent_text
-from imubench_pipeline.words.reasons import exports as texts
 
 AXES = "xyz"
 

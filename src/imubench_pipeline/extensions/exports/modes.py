@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.mapping import as_walk
 from imubench_pipeline.extensions.exports.targets import Target
-from imubench_pipeline.words.reasons import exports as texts
 
 Mode = Literal["bench", "bounded", "in-use"]
 MODES: tuple[Mode, ...] = get_args(Mode)

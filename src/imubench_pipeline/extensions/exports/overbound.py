@@ -48,10 +48,10 @@ from scipy.optimize import linprog, minimize_scalar
 
 from imubench_pipeline import noise
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.growth import growth
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.reasons import exports as texts
 
 Family = Literal["N+K", "N+GM", "N+GM+K"]
 

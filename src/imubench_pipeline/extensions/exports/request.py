@@ -12,6 +12,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.extensions.exports import imu
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.choice import WORST, Choice, choose, pool_recordings
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.mapping import bound_walk, describe_terms
@@ -25,7 +26,6 @@ from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
-from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
 

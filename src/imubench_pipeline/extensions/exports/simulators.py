@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from imubench_pipeline.extensions.exports import comments, programs
+from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import (
     AXES,
     AxisNoise,
@@ -16,7 +17,6 @@ from imubench_pipeline.extensions.exports.imu import (
 from imubench_pipeline.extensions.exports.mapping import Mapped, as_process, find_common_time
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.reasons import exports as texts
 
 _MIN_SAMPLES_IN_T_B = 20.0
 """With fewer samples in T_B, the program's discretisation is off by more than 3 %."""

@@ -11,9 +11,9 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.least_squares import LeastSquares
+from imubench_pipeline.extensions.calibration.sigma_range import sigma_range
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.sigma_range import sigma_range
 from tests.conftest import few
 
 RUN = Experiment.regular(dwell=10.0, turning=2.0, dwells=6, rate=4.0, latitude=0.3)

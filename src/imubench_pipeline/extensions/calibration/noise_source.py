@@ -4,17 +4,16 @@ The log of a turned gyro does not show its noise. The model is of the longest st
 the same sensor, and device if possible, or else of the typical figures of its datasheet.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import Quality
+from imubench_pipeline.recordings.kept import Quality, find_static_recordings
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
@@ -23,7 +22,6 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 
 NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
-Kept = tuple[RecordingRow, Path]  # a recording, and its folder
 _DRAW_SEED = 20260101  # each recording and channel has an independent stream
 
 
@@ -70,20 +68,6 @@ def take_static_noise(
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, source, drawn)
     return None
-
-
-def find_static_recordings(
-    folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
-) -> list[Kept]:
-    """Return the usable static recordings in `folders`: the least `far`, then the longest."""
-
-    def order(recording: Kept) -> tuple[Any, ...]:
-        row = recording[0]
-        return *far(row), -(row.duration or 0.0), row.recording
-
-    every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    usable = [kept for kept in every if (kept[0].kind, kept[0].status) == ("static", "ok")]
-    return sorted(usable, key=order)
 
 
 def find_noise_source(
