@@ -49,7 +49,7 @@ class Code(NamedTuple):
 class FileFormat:
     """Properties of a format of log files, without the code that reads it."""
 
-    name: Reader  # value of `reader` in a sensor file, as in `readers.formats`
+    name: Reader  # value of `reader` in a sensor file
     title: str  # common name of the format
     endings: tuple[str, ...]  # usual suffixes of its files, for messages
     signature: Signature

@@ -140,7 +140,7 @@ def _check_stamp_format(form: str) -> None:
 
 Reader = Literal["csv", "vectornav", "ubx", "novatel", "ulog", "dataflash", "rosbag", "matlab",
                  "numpy", "arrow", "hdf5", "excel"]  # fmt: skip
-"""The formats of log files; each is declared in a module of this name in ``readers/formats``."""
+"""The formats of log files; each is declared in ``readers/formats.py``, or by an extension."""
 
 
 _MIN_RATE, _MAX_RATE = 1e-6, 1e9  # range of valid sampling rates, Hz

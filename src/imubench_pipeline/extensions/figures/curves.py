@@ -10,23 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from imubench_pipeline.datasheets.class_limits import read_grade_limits
-from imubench_pipeline.extensions.figures.style import (
-    GRADE_SHADES,
-    MEASURED,
-    SINGLE,
-    SYMBOLS,
-    compute_limits,
-    convert_line_style,
-    draw_legend_below,
-    fix_layout,
-    make_figure,
-    measure_text,
-    name_channel,
-    name_log,
-    set_log_axis,
-    set_style,
-    write_title,
-)
+from imubench_pipeline.extensions.figures import style
 from imubench_pipeline.noise import FLOOR, NoiseModel, Term
 from imubench_pipeline.report.palette import METHOD_STYLES, SUM_LOOK, TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.report.practical import System, choose_page_unit
@@ -55,13 +39,13 @@ _UNIT_SIGNS = {"deg": "°", "sqrt(Hz)": "√Hz", "sqrt(h)": "√h", "sqrt(s)": "
 def make_channel_axes(view: ChannelView, system: System, what: str) -> tuple[Figure, Axes, float]:
     """Return a figure of a channel, its axes, and the factor from SI to their unit."""
     unit = choose_page_unit(view.quantity, "adev", system)
-    name, of = f"{view.sensor} / {view.recording}", name_channel(view.channel)
+    name, of = f"{view.sensor} / {view.recording}", style.name_channel(view.channel)
     rest = " (simulated)" * view.simulated + f": {of[0].lower()}{of[1:]}"
-    figure = make_figure(SINGLE, 68.0, f"{name}{rest}: {what}")
+    figure = style.make_figure(style.SINGLE, 68.0, f"{name}{rest}: {what}")
     axes = figure.add_subplot()
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
-    write_title(figure, name, rest)
+    style.write_title(figure, name, rest)
     return figure, axes, unit.per_si
 
 
@@ -74,11 +58,11 @@ def draw_measured(axes: Axes, view: ChannelView, scale: float, *, limits: bool =
     axes.plot(
         view.tau,
         view.adev * scale,
-        color=MEASURED,
+        color=style.MEASURED,
         marker="o",
         markersize=2.2,
         linewidth=0.6,
-        label=name_log(view),
+        label=style.name_log(view),
         zorder=2.5,
     )
 
@@ -92,11 +76,11 @@ def draw_grade_bands(axes: Axes, quantity: str, scale: float) -> None:
     edges = [np.full_like(tau, high), *edges, np.full_like(tau, low)]
     for place, name in enumerate(("consumer", *limits)):
         upper, lower = (np.clip(edge, low, high) for edge in edges[place : place + 2])
-        shade = GRADE_SHADES[place]
+        shade = style.GRADE_SHADES[place]
         axes.fill_between(tau, lower, upper, color=shade, lw=0, zorder=0.0)
         ends = [float(axes.transData.transform((tau[-1], y))[1]) for y in (lower[-1], upper[-1])]
         figure = axes.figure.get_figure(root=True)
-        if (ends[1] - ends[0]) * 72.0 / figure.dpi > measure_text(figure, name):
+        if (ends[1] - ends[0]) * 72.0 / figure.dpi > style.measure_text(figure, name):
             middle = float(np.sqrt(lower[-1] * upper[-1]))
             axes.annotate(
                 name,
@@ -114,14 +98,16 @@ def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: f
     """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
     limits = (view.lower, view.upper)
     near = [np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale for limit in limits]
-    set_log_axis(axes, "x", compute_limits(view.tau))
-    set_log_axis(axes, "y", compute_limits(view.adev * scale, *near, list(more), margin=1.4))
+    style.set_log_axis(axes, "x", style.compute_limits(view.tau))
+    style.set_log_axis(
+        axes, "y", style.compute_limits(view.adev * scale, *near, list(more), margin=1.4)
+    )
     draw_grade_bands(axes, view.quantity, scale)
-    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
-    return fix_layout(figure)
+    style.draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    return style.fix_layout(figure)
 
 
-@set_style()
+@style.set_style()
 def draw_allan_figure(view: ChannelView, system: System = "practical") -> Figure:
     """Draw the Allan deviation with its 95 % limits alone (Silva et al., Figure 2)."""
     figure, axes, scale = make_channel_axes(view, system, "Allan deviation")
@@ -129,7 +115,7 @@ def draw_allan_figure(view: ChannelView, system: System = "practical") -> Figure
     return finish(figure, axes, view, scale)
 
 
-@set_style()
+@style.set_style()
 def draw_methods_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the model of each method, and the reconstruction from the recommended one.
 
@@ -150,20 +136,25 @@ def draw_methods_figure(view: ChannelView, system: System = "practical") -> Figu
     ratio.set_ylabel("ratio to log")
     draw_measured(axes, view, scale)
     ratio.fill_between(view.tau, view.lower / view.adev, view.upper / view.adev, color="0.8", lw=0)
-    ratio.axhline(1.0, color=MEASURED, lw=0.6)
+    ratio.axhline(1.0, color=style.MEASURED, lw=0.6)
     _draw_reconstruction(axes, ratio, view, scale)
     relative = []
     for method, model in models.items():
         deviation = np.sqrt(model.allan_variance(view.tau))
         best = method == view.recommended
         width, order = (1.3, 3.0) if best else (0.9, 2.8)
-        look = convert_line_style(METHOD_STYLES[method]) | {"linewidth": width, "zorder": order}
+        look = style.convert_line_style(METHOD_STYLES[method]) | {
+            "linewidth": width,
+            "zorder": order,
+        }
         label = METHOD_NAMES[method] + " (recommended)" * best
         axes.plot(view.tau, deviation * scale, label=label, **look)
         ratio.plot(view.tau, deviation / view.adev, **look)
         relative.append(deviation / view.adev)
     near = np.clip(relative, 1 / _MAX_RATIO, _MAX_RATIO)
-    set_log_axis(ratio, "y", compute_limits(near, view.lower / view.adev, margin=1.1), ticks=5)
+    style.set_log_axis(
+        ratio, "y", style.compute_limits(near, view.lower / view.adev, margin=1.1), ticks=5
+    )
     figure.align_ylabels()
     return finish(figure, axes, view, scale)
 
@@ -200,7 +191,7 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
         )
 
 
-@set_style()
+@style.set_style()
 def draw_terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw every term of the recommended model, their sum, and the points that show N, B and K.
 
@@ -246,7 +237,7 @@ def draw_terms_figure(view: ChannelView, system: System = "practical") -> Figure
             axes.axhline(level, color=TERM_LOOKS[term.symbol]["color"], lw=0.5, ls=(0, (1, 2)))
         factor = "" if reading.factor == 1.0 else f"{reading.factor:.3f} "
         offset = (-5.0 if reading.tau > end else 5.0, -8.0 if below else 4.0)
-        text = f"{factor}{SYMBOLS[reading.symbol]}"
+        text = f"{factor}{style.SYMBOLS[reading.symbol]}"
         mark_point(axes, term.symbol, (reading.tau, level), text, offset, zorder=3.3)
     lowest = float(total.min()) / _MAX_POINT_RATIO
     return finish(figure, axes, view, scale, *(level for level in levels if level > lowest))
@@ -280,12 +271,12 @@ def _label_term(view: ChannelView, term: Term, system: System) -> str:
             elif row.value is None and row.fitted and math.isclose(row.fitted, value):
                 doubts.add(f" ({status_text(row.status)})")
         size, _ = unit.estimate_texts(abs(value), lower, upper)
-        values.append(f"{SYMBOLS[symbol]} = {size} {unit.sign}")
+        values.append(f"{style.SYMBOLS[symbol]} = {size} {unit.sign}")
     name = TERM_NAMES[view.quantity][term.symbol]
     return f"{name}, {', '.join(values)}{''.join(sorted(doubts))}"
 
 
-@set_style()
+@style.set_style()
 def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the curve and the recommended model with the lines that the datasheet prints.
 
@@ -304,7 +295,7 @@ def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Fi
     draw_measured(axes, view, scale)
     model = view.model(view.recommended)
     if model.terms:
-        look = convert_line_style(METHOD_STYLES[view.recommended]) | {"zorder": 2.8}
+        look = style.convert_line_style(METHOD_STYLES[view.recommended]) | {"zorder": 2.8}
         deviation = np.sqrt(model.allan_variance(view.tau)) * scale
         axes.plot(view.tau, deviation, label=METHOD_NAMES[view.recommended], **look)
     levels = []
@@ -337,7 +328,7 @@ _LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more
 _TERM_POINTS = 200  # points of a term: it is smooth
 
 
-@set_style()
+@style.set_style()
 def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the root of the two-sided spectrum, if any, with the model of the likelihood."""
     if not view.spectrum:
@@ -359,7 +350,7 @@ def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Fig
     used = spectrum["used"] > 0
     dot = {"ls": "none", "marker": "o", "markersize": 1.8, "markeredgewidth": 0.4, "zorder": 2.4}
     for chosen, face, edge, label in (
-        (used, MEASURED, MEASURED, f"{name_log(view)}, bins used"),
+        (used, style.MEASURED, style.MEASURED, f"{style.name_log(view)}, bins used"),
         (~used, "white", "0.6", "bins left out"),
     ):
         if chosen.any():
@@ -379,12 +370,12 @@ def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Fig
         name = next((f": {row.model}" for row in view.models if row.chosen), "")
         axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
     _draw_lines(axes, view)
-    set_log_axis(axes, "x", compute_limits(frequency))
+    style.set_log_axis(axes, "x", style.compute_limits(frequency))
     # Single ordinates scatter to almost 0; limits for them would hide the rest.
     low, high = np.nanquantile(level, [0.01, 1.0])
-    set_log_axis(axes, "y", compute_limits([low, high], fitted, margin=1.6))
-    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
-    return fix_layout(figure)
+    style.set_log_axis(axes, "y", style.compute_limits([low, high], fitted, margin=1.6))
+    style.draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    return style.fix_layout(figure)
 
 
 def _draw_lines(axes: Axes, view: ChannelView) -> None:
@@ -425,12 +416,12 @@ CHARACTERISTIC = NoiseModel(
 _DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
 
 
-@set_style()
+@style.set_style()
 def draw_theory_figure(system: System = "practical") -> Figure:
     """Draw the characteristic curve and its reading points (Maia et al., Silva et al., Fig. 1)."""
     unit = choose_page_unit("gyro", "adev", system)
     model = CHARACTERISTIC
-    figure = make_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
+    figure = style.make_figure(style.SINGLE, 68.0, "Characteristic curve of the Allan deviation")
     axes = figure.add_subplot()
     total = np.sqrt(model.allan_variance(_DRAWN_TAU)) * unit.per_si
     for symbol, label, term in (
@@ -441,8 +432,8 @@ def draw_theory_figure(system: System = "practical") -> Figure:
         deviation = np.sqrt(term.allan_variance(_DRAWN_TAU)) * unit.per_si
         axes.plot(_DRAWN_TAU, deviation, label=label, lw=0.8, **TERM_LOOKS[symbol])
     axes.plot(_DRAWN_TAU, total, label="Allan deviation of the sum", zorder=2.8, **SUM_LOOK)
-    set_log_axis(axes, "x", (float(_DRAWN_TAU[0]), float(_DRAWN_TAU[-1])))
-    set_log_axis(axes, "y", compute_limits(total, model.K * unit.per_si, margin=2.0))
+    style.set_log_axis(axes, "x", (float(_DRAWN_TAU[0]), float(_DRAWN_TAU[-1])))
+    style.set_log_axis(axes, "y", style.compute_limits(total, model.K * unit.per_si, margin=2.0))
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation σ(τ) ({unit.sign})")
     # The curve is flat where N / sqrt(tau) = K sqrt(tau / 3).
@@ -454,8 +445,8 @@ def draw_theory_figure(system: System = "practical") -> Figure:
     end = (float(_DRAWN_TAU[-1]), plateau)
     text = f"{FLOOR:.3f} $B$"
     mark_point(axes, "F", (flat, plateau), text, (-4.0, -6.0), beside=end, va="center")
-    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
-    fix_layout(figure)
+    style.draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    style.fix_layout(figure)
     # The angle of a slope on paper is known when the layout is.
     for tau, slope, text in ((0.05, -0.5, "−1/2"), (flat, 0.0, "0"), (2e4, 0.5, "+1/2")):
         level = math.sqrt(float(model.allan_variance(tau))) * unit.per_si

@@ -5,14 +5,9 @@
 
 from imubench_pipeline.registry import Extension
 
+_NAMES = ("vectornav", "ubx", "novatel", "ulog", "dataflash", "rosbag")
+
 EXTENSION = Extension(
     name="formats",
-    formats={
-        "vectornav": "formats.declarations:VECTORNAV",
-        "ubx": "formats.declarations:UBX",
-        "novatel": "formats.declarations:NOVATEL",
-        "ulog": "formats.declarations:ULOG",
-        "dataflash": "formats.declarations:DATAFLASH",
-        "rosbag": "formats.declarations:ROSBAG",
-    },
+    formats={name: f"formats.declarations:{name.upper()}" for name in _NAMES},
 )
