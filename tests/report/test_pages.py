@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from imubench_pipeline import report
+from imubench_pipeline import registry, report
 from imubench_pipeline.registry import installed_extensions
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.pages import ENTRIES, list_pages
@@ -109,3 +109,14 @@ def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None
     assert len({entry.title for entry in ENTRIES}) == len(ENTRIES)
     assert [entry.file for entry in whole.existing] == [entry.file for entry in ENTRIES]
     assert {entry.file for entry in ENTRIES} <= {page.path for page in list_pages(whole)}
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_figures_for_print_are_shown_if_they_are_drawn(
+    drawn: bool, whole: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = [one for one in installed_extensions() if drawn or one.name != "figures"]
+    monkeypatch.setattr(registry, "installed_extensions", lambda: tuple(left))
+    publish(whole, tmp_path)
+    assert ("For print: " in (tmp_path / "index.html").read_text()) == drawn
+    assert ("<figcaption>The characteristic" in (tmp_path / "theory.html").read_text()) == drawn
