@@ -49,7 +49,8 @@ class Extension:
     formats: Mapping[str, str] = field(default_factory=dict)  # of log files, by `reader`
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
     sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
-    figures: Mapping[str, str] = field(default_factory=dict)  # for print, by their use
+    drawings: tuple[str, ...] = ()  # figures of all sensors for print
+    theory_figure: str | None = None  # of the page of theory
     commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
     library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
     sensor_commands: tuple[str, ...] = ()  # on the page of a sensor

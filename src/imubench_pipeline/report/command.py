@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.report.practical import System
     from imubench_pipeline.report.site import Site
 
-_FIGURES: Hook[Callable[..., Sequence[Callable[[], None]]]] = Hook("figures")
+_DRAWINGS: Hook[Callable[..., Sequence[Callable[[], None]]]] = Hook("drawings")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,8 +76,7 @@ def list_drawings(
     tables: "Mapping[str, pa.Table]", system: "System", folder: Path, **kinds: Sequence[str]
 ) -> Sequence[Callable[[], None]]:
     """Return functions that write the figures for print; none without their extension."""
-    drawings = _FIGURES.by_key().get("comparison")
-    return drawings(tables, system, folder, **kinds) if drawings else ()
+    return [one for made in _DRAWINGS.objects() for one in made(tables, system, folder, **kinds)]
 
 
 def _write(site: "Site", arguments: argparse.Namespace) -> None:

@@ -44,12 +44,12 @@ def _find_script() -> Path:
     return Path(str(distribution("plotly").locate_file("plotly/package_data/plotly.min.js")))
 
 
-_FIGURES: Hook[Callable[[System], str]] = Hook("figures")
+_FIGURE: Hook[Callable[[System], str]] = Hook("theory_figure")
 
 
 def _describe_theory(site: Site) -> Mapping[str, object]:
-    draw = _FIGURES.by_key().get("theory")
-    return {"figure": draw and draw(site.system), "terms": read_glossary()}
+    figures = [encode(site.system) for encode in _FIGURE.objects()]
+    return {"figures": figures, "terms": read_glossary()}
 
 
 THEORY = Entry(

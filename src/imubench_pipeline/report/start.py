@@ -304,7 +304,9 @@ def _start(site: Site) -> Mapping[str, object]:
         "rankings": list(_list_rankings(site)),
         "next_steps": list(_list_next_steps(site)),
         "forest": FOREST,
-        "twins": [(c, c.replace("_", " ")) for c in site.channel_names if references("figures")],
+        "twins": [
+            (name, name.replace("_", " ")) for name in site.channel_names if references("drawings")
+        ],
         "parameter_tables": list(together.tables()),
         "latest": len(compared) < len(views),
         "sensors": {name: _describe_sensor(site, name) for name in site.sensors},
