@@ -24,13 +24,7 @@ from imubench_pipeline.model.verdicts import Condition, DoubtMark, Share, Shortf
 DoubtCodes = Annotated[tuple[str, ...], "codes of doubts about the recording (see table doubts)"]
 
 
-@table(
-    "drift",
-    key=(
-        *CHANNEL_KEY,
-        "parameter",
-    ),
-)
+@table("drift", key=(*CHANNEL_KEY, "parameter"))
 class DriftRow(SensorRow):
     device: Annotated[str, "device with the compared recordings"]
     channel: Annotated[str, "channel, gyro_x to accel_z"]

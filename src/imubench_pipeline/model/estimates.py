@@ -34,13 +34,7 @@ _DegreesSource = Annotated[
 ]
 
 
-@table(
-    "allan",
-    key=(
-        *CHANNEL_KEY,
-        "tau",
-    ),
-)
+@table("allan", key=(*CHANNEL_KEY, "tau"))
 class AllanRow(ChannelRow):
     tau: Annotated[float, "cluster length, cluster_size / rate", "s"]
     cluster_size: Annotated[int, "samples in a cluster"]
@@ -87,13 +81,7 @@ class ParameterRow(ChannelRow):
     fitted: FittedValue = None
 
 
-@table(
-    "models",
-    key=(
-        *CHANNEL_KEY,
-        "model",
-    ),
-)
+@table("models", key=(*CHANNEL_KEY, "model"))
 class ModelRow(ChannelRow):
     model: Annotated[str, "the terms: Q, N, F (flicker), GM, K, R"]
     chosen: Annotated[bool, "the model of method likelihood: the lowest BIC"]
@@ -155,13 +143,7 @@ class HistogramRow(ChannelRow):
     count: Annotated[int, "samples in it"]
 
 
-@table(
-    "spectrum",
-    key=(
-        *CHANNEL_KEY,
-        "frequency",
-    ),
-)
+@table("spectrum", key=(*CHANNEL_KEY, "frequency"))
 class SpectrumRow(ChannelRow):
     frequency: Annotated[float, "mean of the bin", "Hz"]
     lower: Annotated[float, "lower end of the bin", "Hz"]
@@ -178,13 +160,7 @@ class FixedBiasRow(ChannelRow):
     unit: Annotated[str, "SI unit of value"]
 
 
-@table(
-    "temperature",
-    key=(
-        *CHANNEL_KEY,
-        "parameter",
-    ),
-)
+@table("temperature", key=(*CHANNEL_KEY, "parameter"))
 class TemperatureRow(ChannelRow):
     compensated: Annotated[
         bool, "whether the effect is removed from the noise (method compensated)"
@@ -199,13 +175,7 @@ class TemperatureRow(ChannelRow):
     fitted: FittedValue = None
 
 
-@table(
-    "allan_compensated",
-    key=(
-        *CHANNEL_KEY,
-        "tau",
-    ),
-)
+@table("allan_compensated", key=(*CHANNEL_KEY, "tau"))
 class CompensatedAllanRow(ChannelRow):
     tau: Annotated[float, "cluster length", "s"]
     adev: Annotated[
@@ -219,13 +189,7 @@ class CompensatedAllanRow(ChannelRow):
     temperature: Annotated[float, "Allan deviation of the temperature effect", "rad/s or m/s^2"]
 
 
-@table(
-    "low_pass",
-    key=(
-        *CHANNEL_KEY,
-        "parameter",
-    ),
-)
+@table("low_pass", key=(*CHANNEL_KEY, "parameter"))
 class LowPassRow(ChannelRow):
     kind: Annotated[str | None, "analogue, bilinear or boxcar; null: none is visible"] = None
     order: Annotated[
@@ -253,13 +217,7 @@ class ReconstructionRow(ChannelRow):
     ]
 
 
-@table(
-    "scores",
-    key=(
-        *CHANNEL_KEY,
-        "method",
-    ),
-)
+@table("scores", key=(*CHANNEL_KEY, "method"))
 class ScoreRow(ChannelRow):
     method: Annotated[str, "estimation method"]
     rms: Annotated[
