@@ -1,4 +1,4 @@
-"""Puts workflow, catalogue and plotly.js into a wheel; all else is in pyproject.toml."""
+"""Puts workflow, catalogue and plotly.js with its licence into a wheel; see pyproject.toml."""
 
 import re
 import tomllib
@@ -42,9 +42,8 @@ class WithProject(build_py):
         for source, target in self._shipped().items():
             self.mkpath(str(Path(target).parent))
             self.copy_file(source, target, preserve_mode=False)
-        if not self.editable_mode:
-            script = distribution("plotly").locate_file(PLOTTING)
-            self.copy_file(str(script), self._plotting(), preserve_mode=False)
+        for source, target in self._plotting().items():
+            self.copy_file(source, target, preserve_mode=False)
 
     def get_source_files(self) -> list[str]:
         """Return what a source distribution needs."""
@@ -52,17 +51,27 @@ class WithProject(build_py):
 
     def get_outputs(self, include_bytecode: bool = True) -> list[str]:
         """Return what is built."""
-        plotting = [] if self.editable_mode else [self._plotting()]
-        return [*super().get_outputs(include_bytecode), *self._shipped().values(), *plotting]
+        added = [*self._shipped().values(), *self._plotting().values()]
+        return [*super().get_outputs(include_bytecode), *added]
 
     def get_output_mapping(self) -> dict[str, str]:
         """Return which file is built of which."""
         shipped = {target: source for source, target in self._shipped().items()}
         return {**super().get_output_mapping(), **shipped}
 
-    def _plotting(self) -> str:
-        """Return where `report.pages` looks for plotly.js in a wheel."""
-        return str(Path(self.build_lib, "imubench_pipeline/report/static/plotly.min.js"))
+    def _plotting(self) -> dict[str, str]:
+        """Return plotly.js and its licence, and the places where `report.pages` looks for them."""
+        if self.editable_mode:
+            return {}
+        plotly = distribution("plotly")
+        licences = [file for file in plotly.files or () if file.name.startswith("LICENSE")]
+        if not licences:
+            raise FileNotFoundError("plotly: found no LICENSE beside it; its script needs it")
+        static = Path(self.build_lib, "imubench_pipeline/report/static")
+        return {
+            str(plotly.locate_file(PLOTTING)): str(static / "plotly.min.js"),
+            str(plotly.locate_file(licences[0])): str(static / "plotly.LICENSE.txt"),
+        }
 
     def _shipped(self) -> dict[str, str]:
         """Return the files and their places in the wheel; in an editable install they stay."""

@@ -77,6 +77,8 @@ ELSEWHERE = {
     "imubench completion zsh > ~/.zfunc/_imubench": "of a shell that is typed into: "
     "tests/test_shipped.py",
     "snakemake -c2 --snakefile <checkout>/workflow/Snakefile": "tests/workflow/test_deployed.py",
+    ".venv/bin/imubench compare before results --fail-on regression": "of two runs: "
+    "tests/test_compare_command.py",
     '.venv/bin/imubench papers results --paper maia --place "Table 3"': "of the demonstration: "
     ".ci/run",
     "docker build -f container/Dockerfile -t imubench .": "needs Docker; nothing runs it here",

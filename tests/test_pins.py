@@ -42,8 +42,11 @@ def test_there_is_a_file_for_each_use() -> None:
 def test_what_is_installed_is_what_was_tested(path: Path) -> None:
     constraints, found = pins(PROJECT / "constraints.txt"), pins(path)
     builds = (PROJECT / "requirements/build.in").read_text().split()
-    assert builds == project()["build-system"]["requires"]
+    least = {one.name: one for one in map(Requirement, project()["build-system"]["requires"])}
+    assert least.keys() == {Requirement(one).name for one in builds}
     for one in map(Requirement, builds):
+        (version,) = one.specifier
+        assert least[one.name].specifier.contains(version.version), one
         assert found[one.name].specifier == one.specifier
     del found["setuptools"]  # which constraints are not for
     for name, one in found.items():
@@ -66,6 +69,14 @@ def test_the_smaller_versions_are_others_of_the_same_packages() -> None:
     for one in map(Requirement, project()["project"]["dependencies"]):
         (version,) = small[canonicalize_name(one.name)].specifier
         assert one.specifier.contains(version.version), one
+
+
+def test_no_requirement_of_the_package_is_pinned() -> None:
+    # conda-forge and Debian have one version of each package.
+    about = project()
+    asked = [*about["build-system"]["requires"], *about["project"]["dependencies"]]
+    asked += [one for extra in about["project"]["optional-dependencies"].values() for one in extra]
+    assert not [one for one in asked if "==" in one.partition(";")[0]]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

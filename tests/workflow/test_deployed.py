@@ -282,6 +282,7 @@ def test_a_wheel_holds_the_files_of_the_checkout(ways: Ways) -> None:
     (script,) = ways.package.glob("report/static/plotly.min.js")
     bundle = distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
     assert script.read_bytes() == Path(str(bundle)).read_bytes()
+    assert "MIT License" in script.with_name("plotly.LICENSE.txt").read_text()
 
 
 @pytest.mark.release

@@ -7,6 +7,7 @@ rule tables:
         **ADDED_TABLES,
     output:
         **as_files(*sorted({*OF_SENSOR, *ADDED_TABLES})),
+        datapackage=RESULTS + "/tables/datapackage.json",
     log:
         LOGS + "/tables.log",
     group:
@@ -14,6 +15,7 @@ rule tables:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
     params:
+        software=plan.describe_software(),
         code=plan.code("tables"),
     script:
         "../scripts/tables.py"

@@ -1,12 +1,16 @@
-"""Join the tables of all sensors, as Parquet and CSV."""
+"""Join the tables of all sensors, as Parquet and CSV, and describe all tables of a run."""
 
+import json
 from pathlib import Path
 
-from imubench_pipeline.steps.tables import join_all_tables
-from imubench_pipeline.tables.files import write_arrow
+from imubench_pipeline.steps.tables import describe_tables, join_all_tables
+from imubench_pipeline.tables.files import write_arrow, write_json
 
 if __name__ == "__main__":
     parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
     joined = join_all_tables(parts)
     for output in map(Path, snakemake.output):
-        write_arrow(joined[output.stem], output)
+        if output.suffix == ".json":
+            write_json(describe_tables(json.loads(snakemake.params.software)), output)
+        else:
+            write_arrow(joined[output.stem], output)

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from imubench_pipeline.model import states
 from imubench_pipeline.model.table import (
+    CHANNEL_KEY,
     ChannelRow,
     LowerLimit,
     OfRecordingRow,
@@ -23,7 +24,7 @@ from imubench_pipeline.model.verdicts import Condition, DoubtMark, Share, Shortf
 DoubtCodes = Annotated[tuple[str, ...], "codes of doubts about the recording (see table doubts)"]
 
 
-@table("drift")
+@table("drift", key=(*CHANNEL_KEY, "parameter"))
 class DriftRow(SensorRow):
     device: Annotated[str, "device with the compared recordings"]
     channel: Annotated[str, "channel, gyro_x to accel_z"]
@@ -104,7 +105,7 @@ class DatasheetRow(ChannelRow):
     doubts: DoubtCodes = ()
 
 
-@table("repeatability")
+@table("repeatability", key=("sensor", "device", "channel"))
 class RepeatabilityRow(SensorRow):
     device: Annotated[str, "device with the compared recordings"]
     channel: Annotated[str, "channel, gyro_x to accel_z"]
@@ -275,7 +276,7 @@ class NextStepRow(SensorRow):
     text: Annotated[str, "in words"] = ""
 
 
-@table("shortlist")
+@table("shortlist", key=("requirement", "sensor"))
 class ShortlistRow(TableRow):
     requirement: Annotated[str, "requirement: file in config/requirements, without .yaml"]
     sensor: Annotated[str, "of the catalogue"]

@@ -6,6 +6,7 @@ import pyarrow as pa
 
 from imubench_pipeline.model.states import BacktestVerdict, GoodnessVerdict
 from imubench_pipeline.model.table import (
+    CHANNEL_KEY,
     ChannelRow,
     Estimate,
     EstimateReason,
@@ -33,7 +34,7 @@ _DegreesSource = Annotated[
 ]
 
 
-@table("allan")
+@table("allan", key=(*CHANNEL_KEY, "tau"))
 class AllanRow(ChannelRow):
     tau: Annotated[float, "cluster length, cluster_size / rate", "s"]
     cluster_size: Annotated[int, "samples in a cluster"]
@@ -55,7 +56,7 @@ class AllanRow(ChannelRow):
     ] = None
 
 
-@table("parameters")
+@table("parameters", key=(*CHANNEL_KEY, "method", "parameter", "component"))
 class ParameterRow(ChannelRow):
     method: Annotated[str, "estimation method"]
     recommended: Annotated[bool, "the method to use for this channel"]
@@ -80,7 +81,7 @@ class ParameterRow(ChannelRow):
     fitted: FittedValue = None
 
 
-@table("models")
+@table("models", key=(*CHANNEL_KEY, "model"))
 class ModelRow(ChannelRow):
     model: Annotated[str, "the terms: Q, N, F (flicker), GM, K, R"]
     chosen: Annotated[bool, "the model of method likelihood: the lowest BIC"]
@@ -142,7 +143,7 @@ class HistogramRow(ChannelRow):
     count: Annotated[int, "samples in it"]
 
 
-@table("spectrum")
+@table("spectrum", key=(*CHANNEL_KEY, "frequency"))
 class SpectrumRow(ChannelRow):
     frequency: Annotated[float, "mean of the bin", "Hz"]
     lower: Annotated[float, "lower end of the bin", "Hz"]
@@ -153,13 +154,13 @@ class SpectrumRow(ChannelRow):
     used: Annotated[bool, "whether the bin is in the fitted band and without lines"]
 
 
-@table("fixed_bias")
+@table("fixed_bias", key=CHANNEL_KEY)
 class FixedBiasRow(ChannelRow):
     value: Annotated[float, "mean of the samples", "as in unit"]
     unit: Annotated[str, "SI unit of value"]
 
 
-@table("temperature")
+@table("temperature", key=(*CHANNEL_KEY, "parameter"))
 class TemperatureRow(ChannelRow):
     compensated: Annotated[
         bool, "whether the effect is removed from the noise (method compensated)"
@@ -174,7 +175,7 @@ class TemperatureRow(ChannelRow):
     fitted: FittedValue = None
 
 
-@table("allan_compensated")
+@table("allan_compensated", key=(*CHANNEL_KEY, "tau"))
 class CompensatedAllanRow(ChannelRow):
     tau: Annotated[float, "cluster length", "s"]
     adev: Annotated[
@@ -188,7 +189,7 @@ class CompensatedAllanRow(ChannelRow):
     temperature: Annotated[float, "Allan deviation of the temperature effect", "rad/s or m/s^2"]
 
 
-@table("low_pass")
+@table("low_pass", key=(*CHANNEL_KEY, "parameter"))
 class LowPassRow(ChannelRow):
     kind: Annotated[str | None, "analogue, bilinear or boxcar; null: none is visible"] = None
     order: Annotated[
@@ -204,7 +205,7 @@ class LowPassRow(ChannelRow):
     fitted: FittedValue = None
 
 
-@table("reconstruction")
+@table("reconstruction", key=(*CHANNEL_KEY, "method", "tau"))
 class ReconstructionRow(ChannelRow):
     method: Annotated[str, "estimation method"]
     tau: Annotated[float, "cluster length", "s"]
@@ -216,7 +217,7 @@ class ReconstructionRow(ChannelRow):
     ]
 
 
-@table("scores")
+@table("scores", key=(*CHANNEL_KEY, "method"))
 class ScoreRow(ChannelRow):
     method: Annotated[str, "estimation method"]
     rms: Annotated[
@@ -260,7 +261,7 @@ class ScoreRow(ChannelRow):
     reason: Annotated[str | None, "reason for a missing score"] = None
 
 
-@table("simulated_truth")
+@table("simulated_truth", key=(*CHANNEL_KEY, "parameter", "component"))
 class SimulatedTruthRow(ChannelRow):
     parameter: Annotated[str, "as in parameters, temperature and low_pass; bias"]
     component: Annotated[int, "number of a repeated term, from 1"]

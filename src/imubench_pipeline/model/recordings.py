@@ -9,7 +9,7 @@ from imubench_pipeline.model.verdicts import DoubtMark
 _Channel = Annotated[str | None, "the channel concerned; null: the whole recording"]
 
 
-@table("recordings")
+@table("recordings", key=("sensor", "recording"))
 class RecordingRow(SensorRow):
     device: Annotated[str, "specimen of the sensor; by default the recording's name"]
     recording: Annotated[str, "name of the recording"]
@@ -35,7 +35,7 @@ class RecordingRow(SensorRow):
     doubts: Annotated[tuple[DoubtMark, ...], "codes and channels of doubts"] = ()
 
 
-@table("files")
+@table("files", key=("file",))
 class FileRow(TableRow):
     file: Annotated[str, "path in the drop zone"]
     sensor: Annotated[str | None, "sensor; null: the file is skipped"] = None

@@ -49,6 +49,9 @@ CATEGORY = pa.dictionary(pa.int32(), pa.string())
 """Arrow type of a column with one of a few values."""
 
 
+CHANNEL_KEY = ("sensor", "recording", "channel")
+"""Columns that identify a channel."""
+
 # Columns that several tables have.
 LowerLimit = Annotated[float | None, "lower 95 % limit", "as in unit"]
 UpperLimit = Annotated[float | None, "upper 95 % limit", "as in unit"]
@@ -127,6 +130,7 @@ class TableRow(_Attributes):
 
     __slots__ = ()
     table: ClassVar[str]
+    key: ClassVar[tuple[str, ...]]  # columns that identify a row; empty: not declared
 
     def columns(self) -> dict[str, object]:
         """Return the values by the names of the columns."""
@@ -179,12 +183,12 @@ AnyRow = TableRow | Mapping[str, Any]
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
-def table(name: str) -> Callable[[type[R]], type[R]]:
-    """Return a decorator that makes a class the rows of a table."""
+def table(name: str, key: tuple[str, ...] = ()) -> Callable[[type[R]], type[R]]:
+    """Return a decorator that makes a class the rows of a table, which ``key`` identifies."""
 
     def declare(cls: type[R]) -> type[R]:
         made = row(cls)
-        made.table = name
+        made.table, made.key = name, key
         made.__doc__ = f"A row of the table ``{name}``."
         return made
 

@@ -4,12 +4,14 @@ This is the interface of the package to the rules. A rule gets the settings on w
 JSON text, so that an edit of the settings reruns only the affected rules.
 """
 
+import hashlib
 import json
 import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property, partial
+from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -441,6 +443,19 @@ class Plan:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
         return to_json([*entries])
+
+    def describe_software(self) -> str:
+        """Return the version of the program, and a digest of all settings that affect results."""
+        ignored = {"logs", "results", "sensors", "requirements", "simulated", "held_back"}
+        used = {sensor for sensor, _ in self.recordings} & self.sensors.keys()
+        settings = [
+            self.run.model_dump(mode="json", exclude={*ignored, "limits", "report"}),
+            {name: self.sensors[name] for name in used},
+            self.requirements,
+            [*self.simulated.values()],
+        ]
+        digest = hashlib.sha256(to_json(settings).encode()).hexdigest()
+        return to_json({"version": version("imubench_pipeline"), "settings": digest[:16]})
 
     @staticmethod
     def code(step: str, package: str = "steps") -> str:

@@ -47,6 +47,7 @@ class Job:
     log: Path  # output of the script is appended to it
     memory: int | None = None  # max. bytes besides the forking process; None: no limit
     results: Path | None = None  # folder for the seals of its outputs; None: no seals
+    threads: int = 1
 
     @property
     def name(self) -> str:

@@ -42,7 +42,9 @@ class Scripts:
         else:  # of a workflow from elsewhere
             cache = SourceCache(given["sourcecache_path"], given["runtime_sourcecache_path"])
             script = cache.get_path(source)
-        parts = {name: given[name] for name in ("input", "output", "params", "wildcards")}
+        parts = {
+            name: given[name] for name in ("input", "output", "params", "wildcards", "threads")
+        }
         log, results = Path(given["log"][0]), self._faults.results
         job = Job(Path(script), **parts, log=log, results=results)
         job.log.unlink(missing_ok=True)

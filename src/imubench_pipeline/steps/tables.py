@@ -1,4 +1,4 @@
-"""Join the tables of all sensors."""
+"""Join the tables of all sensors, and describe them."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ import pyarrow as pa
 
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.recordings.fitness import WITH_DOUBTS, attach_doubts, exclude_simulated
+from imubench_pipeline.tables.datapackage import describe_tables as describe_tables
 from imubench_pipeline.tables.failures import Failure, mark_failures, read_with_failures
 from imubench_pipeline.tables.files import build
 

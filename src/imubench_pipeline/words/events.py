@@ -11,11 +11,13 @@ from imubench_pipeline.words.findings.changes import removal_text
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
 from imubench_pipeline.words.verdicts import doubts_text
 
-_STATES: Mapping[Fitness | None, str] = {
+FITNESS_WORDS: Mapping[Fitness | None, str] = {
     "fit": "usable",
     "fit with doubts": "usable, with doubts",
     "unfit": "not used",
 }
+"""Fitness of a recording as people read it."""
+
 _MAX_SPANS = 4
 Span = tuple[float, float]
 
@@ -26,7 +28,7 @@ def state_text(
     """Return the state of a recording in a line; ``events``: numbers of those that cast doubt."""
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
-    state = _STATES.get(row.fitness, "not judged")
+    state = FITNESS_WORDS.get(row.fitness, "not judged")
     if row.fitness == "fit with doubts" and events:
         state += f" ({', '.join(map(str, events))})"
     rest = "" if moved or row.kind != "static" else "at rest; "

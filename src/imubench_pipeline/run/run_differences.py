@@ -1,0 +1,117 @@
+"""Differences between the results of two runs, such as before and after an upgrade."""
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import get_args
+
+from imubench_pipeline.model.run_differences import DifferenceKind, Result, ResultKey, RunDifference
+from imubench_pipeline.model.states import Verdict
+from imubench_pipeline.tables.files import find_tables, read_any_version
+
+TOLERANCE = 1e-9
+"""Relative difference of equal values: other processors round differently."""
+
+KINDS: tuple[DifferenceKind, ...] = get_args(DifferenceKind)
+_VERDICTS = (*get_args(Verdict), None)  # the best first; None: no verdict
+_NOT_ANALYSED = ("failed", "rejected")
+_STATES = ("fit", "fit with doubts", "unfit", *_NOT_ANALYSED)  # of a recording, the best first
+_LAST_USED = 1  # index in it
+
+Results = Mapping[ResultKey, Result]
+
+
+def load_results(results: Path) -> Results:
+    """Return the recordings, recommended parameters, verdicts and findings of a run.
+
+    The run may be of another version. Raises a `tables.files.TableError` if a table is missing or
+    cannot be read.
+    """
+    paths = find_tables(results, ("recordings", "parameters", "ranking", "findings"))
+    rows = {name: read_any_version(name, path).to_pylist() for name, path in paths.items()}
+    found: dict[ResultKey, Result] = {}
+    for row in rows["recordings"]:
+        state = row["status"] if row["status"] != "ok" else row["fitness"] or "fit"
+        key = ResultKey("recordings", row["sensor"], row["recording"])
+        found[key] = Result(state, detail=row["reason"])
+    for row in rows["parameters"]:
+        if row["recommended"]:
+            place = [
+                row[name] for name in ("sensor", "recording", "channel", "parameter", "component")
+            ]
+            values = [row[name] for name in ("status", "value", "lower", "upper", "unit")]
+            found[ResultKey("parameters", *place)] = Result(*values)
+    for row in rows["ranking"]:
+        if row["decides"]:
+            key = ResultKey("ranking", row["sensor"], name=row["requirement"])
+            found[key] = Result(row["verdict"])
+    for row in rows["findings"]:
+        place = [row[name] for name in ("sensor", "recording", "channel", "finding")]
+        found[ResultKey("findings", *place)] = Result(row["severity"], detail=row["detail"])
+    return found
+
+
+def list_differences(a: Results, b: Results) -> list[RunDifference]:
+    """Return the differences between two runs, the most important first.
+
+    Parameters are compared in recordings that both runs have analysed, findings in recordings and
+    verdicts for sensors and requirements that both have. Run B is worse (`regression`) where
+
+    - a recording is rejected, failed or not used, and was better before,
+    - a parameter has lost its value,
+    - a verdict is worse in the order of `model.states.Verdict`, or missing.
+    """
+    judged_sensors, judged_names = (
+        {getattr(key, part) for key in a if key.table == "ranking"}
+        & {getattr(key, part) for key in b if key.table == "ranking"}
+        for part in ("sensor", "name")
+    )
+    found: list[RunDifference] = []
+    for key in dict.fromkeys([*a, *b]):
+        old, new = a.get(key), b.get(key)
+        recording = ResultKey("recordings", key.sensor, key.recording)
+        states = [run[recording].state for run in (a, b) if recording in run]
+        if key.table == "parameters":
+            if len(states) > 1 and not {*states} & {*_NOT_ANALYSED}:
+                found += _compare_values(key, old or Result("absent"), new or Result("absent"))
+        elif key.table == "findings":
+            if len(states) > 1 and (old is None or new is None):
+                kind: DifferenceKind = "finding_gone" if new is None else "new_finding"
+                found.append(RunDifference(kind, key, old, new))
+        elif key.table == "ranking":
+            if key.sensor in judged_sensors and key.name in judged_names:
+                was, now = (_VERDICTS.index(one.state if one else None) for one in (old, new))
+                found += [RunDifference("verdict", key, old, new, now > was)] * (was != now)
+        elif old is None or new is None:
+            found.append(RunDifference("only_in_b" if old is None else "only_in_a", key, old, new))
+        elif old.state != new.state:
+            was, now = (_STATES.index(state) for state in states)
+            worse = now > max(was, _LAST_USED)
+            found.append(RunDifference("recording_status", key, old, new, worse))
+    return sorted(found, key=_rank)
+
+
+def _compare_values(key: ResultKey, old: Result, new: Result) -> Iterator[RunDifference]:
+    x, y = old.value, new.value
+    if x is not None and y is not None:
+        if abs(y - x) > TOLERANCE * max(abs(x), abs(y)):
+            inside = _is_inside(y, old) and _is_inside(x, new)
+            kind: DifferenceKind = "within_intervals" if inside else "beyond_intervals"
+            yield RunDifference(kind, key, old, new, ratio=y / x if x * y > 0.0 else None)
+    elif x is not None:
+        yield RunDifference("value_lost", key, old, new, regression=True)
+    elif y is not None:
+        yield RunDifference("value_gained", key, old, new)
+    if old.state != new.state and (x is None) == (y is None):
+        yield RunDifference("parameter_status", key, old, new)
+
+
+def _is_inside(value: float, result: Result) -> bool:
+    """Return whether a value is inside the interval of an estimate that has one."""
+    lower, upper = result.lower, result.upper
+    return lower is not None and upper is not None and lower <= value <= upper
+
+
+def _rank(difference: RunDifference) -> tuple[bool, int, float]:
+    size = math.inf if difference.ratio is None else abs(math.log(difference.ratio))
+    return not difference.regression, KINDS.index(difference.kind), -size

@@ -1,0 +1,60 @@
+"""Describe the joined tables of a run for other programs, as a Data Package (datapackage.org)."""
+
+from typing import Any
+
+import pyarrow as pa
+
+from imubench_pipeline.model.table import TypedColumn
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, ROWS, TABLES
+
+_TYPES = {pa.float64(): "number", pa.int64(): "integer", pa.bool_(): "boolean"}
+_RECORDING = ["sensor", "recording"]
+
+
+def describe_tables(software: object) -> dict[str, Any]:
+    """Return the descriptor of the joined tables: name, type, unit and meaning of each column.
+
+    It follows version 2.0 of the standard. Resources are the CSV files, in which ``;`` joins lists.
+    Additions to it are ``parquet``, the same table as Parquet, ``unit``, and ``software``.
+    """
+    return {
+        "$schema": "https://datapackage.org/profiles/2.0/datapackage.json",
+        "name": "imubench-tables",
+        "software": software,
+        "resources": [
+            {
+                "name": name,
+                "type": "table",
+                "path": f"{name}.csv",
+                "format": "csv",
+                "mediatype": "text/csv",
+                "encoding": "utf-8",
+                "parquet": f"{name}.parquet",
+                "schema": _describe_schema(name),
+            }
+            for name in TABLES
+            if name not in OF_ONE_RECORDING
+        ],
+    }
+
+
+def _describe_schema(name: str) -> dict[str, Any]:
+    schema: dict[str, Any] = {"fields": [_describe_column(column) for column in TABLES[name]]}
+    if ROWS[name].key:
+        schema["primaryKey"] = [*ROWS[name].key]
+    required = {column.name for column in TABLES[name] if column.required}
+    if name != "recordings" and required.issuperset(_RECORDING):
+        reference = {"resource": "recordings", "fields": _RECORDING}
+        schema["foreignKeys"] = [{"fields": _RECORDING, "reference": reference}]
+    return schema
+
+
+def _describe_column(column: TypedColumn) -> dict[str, Any]:
+    field: dict[str, Any] = {"name": column.name, "type": _TYPES.get(column.type, "string")}
+    if column.is_list:
+        field |= {"type": "list", "delimiter": ";"}
+    field |= {"description": column.meaning, "unit": column.unit}
+    field["constraints"] = {"required": column.required and not column.is_list}
+    if column.values:
+        field["constraints"]["enum"] = [*column.values]
+    return field
