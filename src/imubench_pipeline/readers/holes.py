@@ -89,7 +89,7 @@ class ZeroRuns:
 
     def add(self, block: bytes) -> None:
         """Count the zero bytes of the next block."""
-        if block[:1] == b"\0" and block == bytes(len(block)):  # 5 times as fast as in general
+        if not block[:1].strip(b"\0") and block == bytes(len(block)):  # 5 times as fast
             self._extend(block, 0, len(block))
         elif self._run or self._zeros in block or block[-1] == 0:
             inner = block.lstrip(b"\0")
