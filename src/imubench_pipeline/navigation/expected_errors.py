@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.printed_noise import End
 from imubench_pipeline.earth import STANDARD_GRAVITY
@@ -29,8 +30,9 @@ from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
-from imubench_pipeline.noise.model import sum_over_terms
+from imubench_pipeline.noise.model import stack_models, sum_over_stacked_terms
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Array
@@ -423,14 +425,15 @@ def list_growth_rows(
     axes = collect_axis_errors(estimates, figures)
 
     @cache
-    def models(channel: str) -> Sequence[NoiseModel]:
+    def models(channel: str) -> tuple[int, list[tuple[NDArray[np.intp], Term]]]:
         stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
-        return uncertainty.draw_models(estimates[channel], draws, stream)
+        drawn = uncertainty.draw_models(estimates[channel], draws, stream)
+        return len(drawn), list(stack_models(drawn))  # once, and not for each question
 
     @cache
     def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
-        return sum_over_terms(
-            models(channel), lambda term: np.asarray(term.growth(order, time, start))
+        return sum_over_stacked_terms(
+            *models(channel), lambda term: np.asarray(term.growth(order, time, start))
         )
 
     def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:

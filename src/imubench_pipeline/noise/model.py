@@ -1,7 +1,7 @@
 """The noise model of one axis: the sum of its terms."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -188,7 +188,17 @@ def sum_over_terms(
     ``figure`` returns an array of shape (k,), or (places, k), for a term with array parameters of
     shape (k,). The result has the shape (models,), or (places, models).
     """
-    total = np.zeros((len(models),) if places is None else (places, len(models)))
-    for numbers, term in stack_models(models):
+    return sum_over_stacked_terms(len(models), stack_models(models), figure, places)
+
+
+def sum_over_stacked_terms(
+    number: int,
+    stacked: Iterable[tuple[NDArray[np.intp], Term]],
+    figure: Callable[[Term], Array],
+    places: int | None = None,
+) -> Array:
+    """Return the same for ``number`` models that are already stacked (see `stack_models`)."""
+    total = np.zeros((number,) if places is None else (places, number))
+    for numbers, term in stacked:
         total[..., numbers] += figure(term)
     return total

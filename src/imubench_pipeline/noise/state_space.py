@@ -23,6 +23,7 @@ class StateSpace:
     initial_variance: Array  # (m, m): the stationary covariance, or 0 for a random walk
 
     @classmethod
+    @lru_cache(maxsize=256)  # an ensemble repeats the same call some hundred times
     def scalar(
         cls, transition: float, process_noise: float, initial_variance: float
     ) -> "StateSpace":

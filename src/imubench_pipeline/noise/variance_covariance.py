@@ -51,14 +51,21 @@ def compute_variance_covariance(
     omega, width = _make_strata(int(sizes.max()))
     half = omega / 2.0
     spectrum = model.sampled_spectrum(omega, rate) / np.sin(half) ** 2
-    shaped = np.sin(np.outer(n, half))
-    shaped *= shaped
-    shaped *= shaped
     # The integral over all frequencies is twice the integral over the positive ones.
-    shaped *= 4.0 * spectrum * np.sqrt(width / np.pi)
+    shaped = _shape_differences(tuple(n.tolist())) * (4.0 * spectrum * np.sqrt(width / np.pi))
     shaped /= (n**2)[:, None]
     effective = samples - _CLUSTERS_LOST_AT_ENDS * np.minimum.outer(n, n) + 1.0
     return np.asarray(shaped @ shaped.T / (2.0 * effective))
+
+
+@lru_cache(maxsize=4)  # the channels and methods of a log have the same sizes
+def _shape_differences(sizes: tuple[float, ...]) -> Array:
+    """Return sin^4(n w/2) of all sizes n and strata, shape (sizes, strata)."""
+    omega, _ = _make_strata(int(max(sizes)))
+    shaped = np.sin(np.outer(sizes, omega / 2.0))
+    shaped *= shaped
+    shaped *= shaped
+    return shaped
 
 
 @lru_cache(maxsize=16)

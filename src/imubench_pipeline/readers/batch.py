@@ -123,6 +123,8 @@ class LogFile(ABC):
             raw = raw - source.offset
         with np.errstate(over="ignore"):  # infinite, and counted as such
             figures = raw * (source.scale * factor)
-        if len(figures) and max(np.fmax.reduce(figures), -np.fmin.reduce(figures)) < _MIN_MAGNITUDE:
+        # One large value is enough, and is usually the first.
+        small = len(figures) and not abs(figures[0]) >= _MIN_MAGNITUDE
+        if small and max(np.fmax.reduce(figures), -np.fmin.reduce(figures)) < _MIN_MAGNITUDE:
             figures = np.where(np.isnan(figures), np.nan, 0.0)
         return figures + zero if zero else figures

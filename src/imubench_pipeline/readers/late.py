@@ -63,6 +63,8 @@ def _find_order(time: NDArray[np.float64], kept: int) -> tuple[NDArray[np.int64]
     ``time``: stamps, s, shape (n,). ``kept``: last records before which later ones may belong.
     """
     order = np.arange(len(time))
+    if (time[1:] >= time[:-1]).all():  # in order, and no stamp is missing
+        return order, max(len(time) - kept, 0)
     present = np.isfinite(time)
     highest = np.maximum.accumulate(np.where(present, time, -np.inf))
     lowest = np.minimum.accumulate(np.where(present, time, np.inf)[::-1])[::-1]

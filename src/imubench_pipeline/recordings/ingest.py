@@ -331,7 +331,10 @@ def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn |
     """Return the rotation of gravity relative to the sensor; None if none is detected."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     place = {name: n for n, part in enumerate(parts) for name in part.columns if name in axes}
-    if len({(parts[n].digest(), parts[n].rows) for n in place.values()}) != 1 or len(place) < 3:
+    used = set(place.values())
+    if len(place) < 3 or (
+        len(used) > 1 and len({(parts[n].digest(), parts[n].rows) for n in used}) > 1
+    ):
         return None  # they have no clock in common
     blocks = [parts[place[name]].columns[name].blocks() for name in axes]
     return detect_gravity_turn(blocks, bases[place[axes[0]]].rate)

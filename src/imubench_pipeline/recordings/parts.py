@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import math
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,9 +34,9 @@ class Part:
     source: LogFile
     data: Path
     stamps_path: Path
-    present_path: Path
+    absent_path: Path
     """Scratch files: the columns as Parquet, the stamps, and a bit mask per record of the columns
-    with a number."""
+    without a number. It is sparse: records with all numbers are a hole in it."""
     writer: LogWriter  # writer of ``data``; open until the metadata are known
     rows: int = 0  # number of records that are used
     columns: dict[str, ColumnSummary] = field(default_factory=dict)  # statistics of each column
@@ -58,7 +59,8 @@ class Part:
     def present(self) -> Iterator[NDArray[np.uint16]]:
         """Yield bit masks of the columns with a number, in the same blocks as the stamps."""
         for start in range(0, self.rows, STAMP_BLOCK):
-            yield np.fromfile(self.present_path, np.uint16, STAMP_BLOCK, offset=2 * start)
+            absent = np.fromfile(self.absent_path, np.uint16, STAMP_BLOCK, offset=2 * start)
+            yield absent ^ np.uint16(len(self.patterns) - 1)
 
     def digest(self) -> str:
         """Return a digest of the stamps; files with the same digest share a clock."""
@@ -76,14 +78,14 @@ def open_part(
 
     The function writes consecutive records and adds them to the statistics: stamps, s, and samples.
     """
-    data, stamps, present = (
-        scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "present")
+    data, stamps, absent = (
+        scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "absent")
     )
     summaries = {column: ColumnSummary() for column in columns}
     writer = LogWriter(data, dict.fromkeys(summaries, pa.float64()))
-    part = Part(source, data, stamps, present, writer, columns=summaries)
+    part = Part(source, data, stamps, absent, writer, columns=summaries)
     part.patterns = np.zeros(1 << len(summaries), np.int64)
-    with stamps.open("wb") as stamps_file, present.open("wb") as present_file:
+    with stamps.open("wb") as stamps_file, absent.open("wb") as absent_file:
 
         def write(time: Array | None, columns: Mapping[str, Array]) -> None:
             # Not `tofile`: it does not report a failed write when the C library closes the file.
@@ -92,15 +94,20 @@ def open_part(
                 stamps_file.write(np.ascontiguousarray(time).data)
             counted = {name: part.columns[name].add(values) for name, values in columns.items()}
             rows = len(next(iter(counted.values())))
-            bits = np.zeros(rows, np.uint16)
-            for place, name in enumerate(part.columns):
-                bits |= np.isfinite(counted[name]).astype(np.uint16) << np.uint16(place)
-            part.patterns += np.bincount(bits, minlength=len(part.patterns))
-            present_file.write(bits.data)
+            if any(np.isnan(values.sum()) for values in counted.values()):
+                bits = np.zeros(rows, np.uint16)
+                for place, name in enumerate(part.columns):
+                    bits |= np.isnan(counted[name]).astype(np.uint16) << np.uint16(place)
+                part.patterns += np.bincount(bits, minlength=len(part.patterns))[::-1]
+                absent_file.write(bits.data)
+            else:
+                part.patterns[-1] += rows
+                absent_file.seek(2 * rows, os.SEEK_CUR)
             part.rows += rows
             part.writer.write(counted)
 
         yield part, write
+        absent_file.truncate()  # to its position, after a hole
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:

@@ -192,8 +192,28 @@ def is_set_back(stamps: Array, i: int, step: float, interval: float) -> bool:
     for k in range(i - count + 1, i + count):
         if k != i and stamps[k] < stamps[k - 1]:
             return False
-    advance = np.nanmedian(stamps[i : i + count]) - np.nanmedian(stamps[i - count : i])
+    advance = _compute_median(stamps, i, i + count) - _compute_median(stamps, i - count, i)
     return bool(advance < count * interval + 0.5 * step)
+
+
+@njit(cache=True, nogil=True)
+def _compute_median(stamps: Array, first: int, stop: int) -> float:
+    """Return the median of few stamps, s; NaN if all are missing.
+
+    It compiles in a tenth of the time of `np.nanmedian`.
+    """
+    present, number = np.empty(stop - first), 0
+    for k in range(first, stop):
+        if not np.isnan(stamps[k]):
+            place = number
+            while place > 0 and present[place - 1] > stamps[k]:
+                present[place] = present[place - 1]
+                place -= 1
+            present[place] = stamps[k]
+            number += 1
+    if number == 0:
+        return np.nan
+    return 0.5 * (present[(number - 1) // 2] + present[number // 2])
 
 
 @njit(cache=True, nogil=True)

@@ -105,22 +105,32 @@ class TermSearch:
             part = gram[:, chosen[:, None], chosen] + _RIDGE * np.eye(len(chosen))
             inverses[:, i, chosen[:, None], chosen] = np.linalg.inv(part)
         products = target @ columns
-        squares, index, cost = _solve_all(
-            inverses, products, (target**2).sum(axis=1), self._masks, self._gains
-        )
+        squares, cost = np.zeros((len(variances), TERMS)), (target**2).sum(axis=1)
+        index = np.full(len(variances), -1)
+        _solve_all(inverses, products, self._masks, self._gains, squares, index, cost)
         times = np.where(index >= 0, self.times[index], np.nan)
         return Solutions(squares / size[np.maximum(index, 0)], times, cost)
 
 
 @njit(cache=True)
 def _solve_all(
-    inverses: Array, products: Array, totals: Array, masks: NDArray[np.bool_], gains: Array
-) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return squares, index of the time (-1: no process) and cost of each curve."""
+    inverses: Array,
+    products: Array,
+    masks: NDArray[np.bool_],
+    gains: Array,
+    squares: Array,
+    index: NDArray[np.int64],
+    cost: Array,
+) -> None:
+    """Set squares, index of the time (-1: no process) and cost of each curve.
+
+    They begin with 0, -1 and the cost without any term. Arrays are made and copied outside, where
+    numba need not compile it.
+    """
     times, curves, terms = products.shape
-    squares, trial = np.zeros((curves, terms)), np.zeros(terms)
-    index, cost = np.full(curves, -1), totals.copy()
+    trial = np.empty(TERMS)
     for q in range(curves):
+        total = cost[q]
         for s in range(len(masks)):
             mask = masks[s]
             for t in range(times if mask[PROCESS] else 1):
@@ -135,8 +145,8 @@ def _solve_all(
                             positive = False
                             break
                         explained += trial[i] * products[t, q, i]
-                if positive and totals[q] - explained + gains[s] < cost[q]:
-                    cost[q] = totals[q] - explained + gains[s]
+                if positive and total - explained + gains[s] < cost[q]:
+                    cost[q] = total - explained + gains[s]
                     index[q] = t if mask[PROCESS] else -1
-                    squares[q] = trial
-    return squares, index, cost
+                    for i in range(terms):
+                        squares[q, i] = trial[i]

@@ -1,7 +1,9 @@
 """Read delimited text: find the layout of a log, then read it with pyarrow in large blocks."""
 
 import re
+from collections import deque
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
 
 _BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
+_BLOCKS_AHEAD = 32  # parsed while a row group is compressed
 _ADVICE = (
     "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
     "file does not describe it (delimiter, decimal, header, skip_lines, comment, column)"
@@ -89,7 +92,8 @@ class CsvFile(LogFile):
         """Yield all records, with stamps converted by ``time``."""
         records = layout.records()
         rows = 0
-        for part in self._parts(layout, set(columns.values()), time, records):
+        parts = self._parts(layout, set(columns.values()), time, records)
+        for part in _read_ahead(parts):
             try:
                 stamps = None if time is None else time.seconds(part)
             except text_stamps.StampError as error:
@@ -225,6 +229,15 @@ class CsvFile(LogFile):
             expected = time.expected
         line = self._line(int(row[1]), layout, blank=True)
         return self._bad_cell(line, layout.names[position], value[1] or value[2] or "", expected)
+
+
+def _read_ahead(parts: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+    """Yield parts while another thread parses the next ones."""
+    with ThreadPoolExecutor(1) as pool:
+        waiting = deque(pool.submit(next, parts, None) for _ in range(_BLOCKS_AHEAD))
+        while (part := waiting.popleft().result()) is not None:
+            waiting.append(pool.submit(next, parts, None))
+            yield part
 
 
 class _WrongWidth:

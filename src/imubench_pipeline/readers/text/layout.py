@@ -117,6 +117,8 @@ class _Search:
         self._figures = figures
         self._wanted = [*figures, *times]
         self._names = [column for column in self._wanted if isinstance(column, str)]
+        unquoted = (re.escape(name.replace('"', "")) for name in self._names)
+        self._any_name = re.compile("|".join(unquoted))
         self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
@@ -284,7 +286,7 @@ class _Search:
         width = Counter(map(len, rows)).most_common(1)[0][0]
         even = [row for row in rows if len(row) == width]
         shown, fits = 0, False
-        for line in [*lines, *comments] if self._names else []:
+        for line in filter(self._may_have_names, [*lines, *comments]) if self._names else []:
             names = self._names_in(split, line, width)
             count = sum(name in names for name in self._names)
             if count > shown:
@@ -294,6 +296,10 @@ class _Search:
         cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
         alike = len(even) / len(rows) * sum(map(is_datum, cells)) / max(len(cells), 1)
         return (shown, fits, width > 1, round(alike, 2))
+
+    def _may_have_names(self, line: _Line) -> bool:
+        """Return whether a line contains a required name, with any delimiter."""
+        return self._any_name.search(line.text.replace('"', "")) is not None
 
     def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:
         """Return the names in a line, without the sign of a comment."""
@@ -336,7 +342,7 @@ class _Search:
             return (None if place is None else near[place]), first
         if self._names:
             wanted = set(self._names)
-            candidates = [*lines, *reversed(comments)]
+            candidates = filter(self._may_have_names, [*lines, *reversed(comments)])
             named = (x for x in candidates if wanted.issubset(self._names_in(split, x, width)))
             header = next(named, None)
             if header is not None and header in comments:

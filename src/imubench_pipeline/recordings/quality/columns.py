@@ -16,7 +16,11 @@ from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, joined, levels, summary
 from imubench_pipeline.recordings.quality.copies import find_shared_noise
 from imubench_pipeline.recordings.quality.rest import find_motion
-from imubench_pipeline.recordings.quality.summary import BlockStatistics, compute_finite_median
+from imubench_pipeline.recordings.quality.summary import (
+    BlockStatistics,
+    compute_finite_median,
+    compute_finite_medians,
+)
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
@@ -346,7 +350,7 @@ def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     # Medians are robust to knocks. The means of blocks with few samples scatter too much.
     mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
     grouped = mean[: len(mean) // size * size].reshape(-1, size)
-    means = np.array([compute_finite_median(group) for group in grouped])
+    means = compute_finite_medians(grouped)
     if len(means) < 16:
         return []
     # Difference over two windows, so that a step inside a window counts in full.
@@ -398,7 +402,7 @@ def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | No
     if size < _MIN_BLOCKS_PER_PART:
         return None
     parts = blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
-    spreads = np.array([compute_finite_median(part) for part in parts])
+    spreads = compute_finite_medians(parts)
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
     if not np.isfinite(calm):

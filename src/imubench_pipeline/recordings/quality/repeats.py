@@ -181,14 +181,14 @@ def _match_window(
 @njit(cache=True, nogil=True)
 def _drop_windows(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
     """Remove the windows with a hash above the limit."""
-    kept_keys, kept_places = np.empty_like(keys), np.empty_like(places)
+    kept_keys, kept_places = np.empty(keys.size, np.uint64), np.empty((keys.size, 2), np.int64)
     number = 0
     for slot in range(keys.size):
         if keys[slot] != np.uint64(0) and keys[slot] <= limit:
             kept_keys[number] = keys[slot]
             kept_places[number, 0], kept_places[number, 1] = places[slot, 0], places[slot, 1]
             number += 1
-    keys[:] = np.uint64(0)
+        keys[slot] = np.uint64(0)
     mask = np.uint64(_SLOTS - 1)
     for k in range(number):
         place = kept_keys[k] & mask

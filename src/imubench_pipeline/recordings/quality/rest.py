@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_finite_median
 from imubench_pipeline.typing import Array
@@ -67,14 +68,20 @@ def find_motion(
     is no motion.
     """
     # The windows with the slow signals of a sensor in motion
+    least_mean = _MIN_DEVIATION[quantity]
     size, windows, slow = max(round(_WINDOW * rate), _MIN_WINDOW), 0, []
     for piece in column.excerpts():
         first = piece.first
-        for samples in np.array_split(piece.values, max(len(piece.values) // size, 1)):
-            present = samples[np.isfinite(samples)]
-            if _has_slow_signals(present, rate, _MIN_DEVIATION[quantity]):
-                slow.append((first, first + len(samples)))
-            first, windows = first + len(samples), windows + 1
+        parts = np.array_split(piece.values, max(len(piece.values) // size, 1))
+        present = [part[np.isfinite(part)] for part in parts]
+        # Windows of one length are judged in one call
+        alike = len({len(samples) for samples in present}) == 1
+        rows = [np.array(present)] if alike else [samples[None] for samples in present]
+        moving = np.concatenate([_have_slow_signals(row, rate, least_mean) for row in rows])
+        for part, moves in zip(parts, moving, strict=True):
+            if moves:
+                slow.append((first, first + len(part)))
+            first, windows = first + len(part), windows + 1
     if len(slow) > _MAX_MOVING_SHARE * windows:
         return [(0, column.present + column.missing)]
     blocks = column.blocks()
@@ -98,19 +105,23 @@ def find_motion(
     )
 
 
-def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:
-    """Return whether means of 0.1 to 3 s deviate more than ``least``, and far more than noise."""
-    if len(samples) < 2:
-        return False
-    single = float(np.mean(np.diff(samples) ** 2))
+def _have_slow_signals(samples: Array, rate: float, least: float) -> NDArray[np.bool_]:
+    """Return for windows, shape (w, n), whether they have slow and large signals, shape (w,).
+
+    Means of 0.1 to 3 s then deviate more than ``least``, SI, and far more than noise.
+    """
+    number, length = samples.shape
+    slow = np.zeros(number, np.bool_)
+    if length < 2:
+        return slow
+    single = np.mean(np.diff(samples) ** 2, axis=1)
     pole = math.exp(-2.0 * math.pi * _NARROWEST_FILTER / rate)
     ratio = _MIN_SLOW_NOISE * (1.0 + pole) / (1.0 - pole) ** 2
     for size in np.unique(np.rint(_AVERAGES * rate).astype(int)):
-        clusters = len(samples) // max(size, 1)
+        clusters = length // max(size, 1)
         if size < 2 or clusters < _MIN_CLUSTERS:
             continue
-        means = samples[: clusters * size].reshape(clusters, size).mean(axis=1)
-        squares = float(np.mean(np.diff(means) ** 2))
-        if squares > 2.0 * least**2 and squares * size > ratio * single:
-            return True
-    return False
+        means = samples[:, : clusters * size].reshape(number, clusters, size).mean(axis=2)
+        squares = np.mean(np.diff(means) ** 2, axis=1)
+        slow |= (squares > 2.0 * least**2) & (squares * size > ratio * single)
+    return slow

@@ -90,6 +90,13 @@ def compute_finite_median(values: Array) -> float:
     return float(np.median(present)) if len(present) else float("nan")
 
 
+def compute_finite_medians(rows: Array) -> Array:
+    """Return the median of the finite values of each row, shape (n,); NaN if there are none."""
+    if rows.size and np.isfinite(rows).all():
+        return np.asarray(np.median(rows, axis=1))
+    return np.array([compute_finite_median(row) for row in rows])
+
+
 PIECE_SIZE = 4096  # records of a piece
 MAX_PIECES = 16  # every second one is dropped then; a shorter log is stored whole
 
