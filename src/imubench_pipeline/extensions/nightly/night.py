@@ -32,6 +32,7 @@ from imubench_pipeline.extensions.nightly.summary import (
     StateError,
     Summary,
     compare_states,
+    describe_reanalysis,
     format_summary,
     load_tables,
     make_state,
@@ -43,6 +44,7 @@ from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import end_group
+from imubench_pipeline.run.run_differences import Results, load_results
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import write_content, write_json
@@ -197,6 +199,7 @@ class Night:
                 before = None
                 self._put_right.append(str(error))
             self._recover(lock)
+            self._results_before = _load_results(self.results)
             seen, skips = find_settled_logs(self.logs, settle, before.logs if before else {})
             try:
                 failure = self._run_snakemake(cores, skips, lock)
@@ -269,6 +272,9 @@ class Night:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = make_state(tables, finished, logs, since)
             changes = compare_states(before, after, tables, late)
+            if names := {each.recording for each in changes.changed if not each.new_log}:
+                results = (self._results_before, _load_results(self.results))
+                changes.reanalysis += describe_reanalysis(*results, names)
             files = describe_drop_zone(self.results)
             analysed = after.recordings
             after = after.without(late, before)
@@ -311,6 +317,14 @@ class Night:
         if after is not None:
             after.write(self._state)
             seal_files(self.results, name_night_place("state"), [self._state], {})
+
+
+def _load_results(results: Path) -> Results:
+    """Return the results of a run to compare; empty if there are none that can be read."""
+    try:
+        return load_results(results)
+    except (OSError, ValueError):
+        return {}
 
 
 @contextmanager
