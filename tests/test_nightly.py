@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.extensions.nightly.night import Night
+from imubench_pipeline.extensions.nightly.recovery import end_left_over, remove_doubtful
 from imubench_pipeline.extensions.nightly.settling import (
     Skip,
     find_changed_logs,
@@ -345,7 +346,7 @@ def test_what_was_on_its_way_when_the_power_went_is_made_again(tmp_path: Path) -
         stamp(tmp_path / "exports/s/kalibr.yaml", OLD - 90.0),
         stamp(tmp_path / "nightly/latest.txt", OLD + 90.0),
     ]
-    assert recovery.remove_doubtful(tmp_path) == 4
+    assert remove_doubtful(tmp_path) == 4
     assert not any(path.exists() for path in gone)
     assert all(path.exists() for path in kept)
 
@@ -370,11 +371,11 @@ def test_steps_that_run_on_are_ended(tmp_path: Path) -> None:
         try:
             note = {"host": platform.node(), "since": since}
             project = tmp_path / "project"
-            assert recovery.end_left_over({}, project) == 0
-            assert recovery.end_left_over(note | {"snakemake": other.pid}, project) == 0
+            assert end_left_over({}, project) == 0
+            assert end_left_over(note | {"snakemake": other.pid}, project) == 0
             strange = note | {"snakemake": step.pid, "host": "another"}
-            assert recovery.end_left_over(strange, project) == 0
-            assert recovery.end_left_over(note | {"snakemake": step.pid}, project) == 1
+            assert end_left_over(strange, project) == 0
+            assert end_left_over(note | {"snakemake": step.pid}, project) == 1
             step.wait(10)
             assert other.poll() is None
         finally:

@@ -130,30 +130,6 @@ rule reconstruct:
         "../scripts/reconstruct.py"
 
 
-# Of recordings of boards alone, whose source compares samples by eye.
-rule samples_of_models:
-    input:
-        quality=KEPT + "/quality.json",
-        parameters=KEPT + "/parameters.parquet",
-        low_pass=KEPT + "/low_pass.parquet",
-        temperature=KEPT + "/temperature.parquet",
-        fixed_bias=KEPT + "/fixed_bias.parquet",
-    output:
-        samples_of_models=KEPT + "/samples_of_models.parquet",
-    log:
-        LOGS + "/recordings/{sensor}/{recording}/samples_of_models.log",
-    group:
-        "recording"
-    resources:
-        **cost(Cost(memory=400, memory_of_samples=20, time=4, time_of_values=0.1)),
-    params:
-        settings=plan.settings("reconstruction"),
-        code=plan.code("samples_of_models"),
-        attempt=tried("samples_of_models"),
-    script:
-        "../scripts/samples_of_models.py"
-
-
 rule datasheet:
     input:
         quality=KEPT + "/quality.json",
@@ -205,7 +181,6 @@ rule error_budget:
 
 
 JOBS["simulate"] = jobs_of_each(plan.simulated)
-JOBS["samples_of_models"] = jobs_of_each(plan.on_boards)
 
 # What is kept of every recording, and those of its tables that its sensor's are joined from.
 OF_RECORDING = (

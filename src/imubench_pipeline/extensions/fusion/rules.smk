@@ -1,4 +1,4 @@
-"""Several sensors together."""
+"""Several sensors together, and sensors on boards."""
 
 
 rule fusion:
@@ -22,3 +22,30 @@ rule fusion:
         code=plan.code("fusion", "extensions.fusion"),
     script:
         "scripts/fusion.py"
+
+
+# Of recordings of boards alone, whose source compares samples by eye.
+rule samples_of_models:
+    input:
+        quality=KEPT + "/quality.json",
+        parameters=KEPT + "/parameters.parquet",
+        low_pass=KEPT + "/low_pass.parquet",
+        temperature=KEPT + "/temperature.parquet",
+        fixed_bias=KEPT + "/fixed_bias.parquet",
+    output:
+        samples_of_models=KEPT + "/samples_of_models.parquet",
+    log:
+        LOGS + "/recordings/{sensor}/{recording}/samples_of_models.log",
+    group:
+        "recording"
+    resources:
+        **cost(Cost(memory=400, memory_of_samples=20, time=4, time_of_values=0.1)),
+    params:
+        settings=plan.settings("reconstruction"),
+        code=plan.code("samples_of_models", "extensions.fusion"),
+        attempt=tried("samples_of_models"),
+    script:
+        "scripts/samples_of_models.py"
+
+
+JOBS["samples_of_models"] = jobs_of_each(plan.on_boards)

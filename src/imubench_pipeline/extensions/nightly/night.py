@@ -18,6 +18,7 @@ from typing import IO
 
 import yaml
 
+from imubench_pipeline.extensions.nightly.recovery import end_group, end_left_over, remove_doubtful
 from imubench_pipeline.extensions.nightly.settling import (
     Found,
     Skip,
@@ -39,11 +40,10 @@ from imubench_pipeline.extensions.nightly.summary import (
     read_state,
 )
 from imubench_pipeline.report.run_summary import describe_drop_zone
-from imubench_pipeline.run import recovery
 from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
-from imubench_pipeline.run.recovery import end_group
+from imubench_pipeline.run.recovery import remove_temporary, was_restarted
 from imubench_pipeline.run.run_differences import Results, load_results
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
@@ -219,13 +219,13 @@ class Night:
     def _recover(self, lock: Lock) -> None:
         if note := lock.left_over:
             self._put_right.append(f"the run of {note.get('since')} did not reach its end")
-        if ended := recovery.end_left_over(note, self.project):
+        if ended := end_left_over(note, self.project):
             self._put_right.append(f"steps that still ran, and were ended: {ended}")
-        if recovery.was_restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
+        if was_restarted(note) and (doubtful := remove_doubtful(self.results)):
             self._put_right.append(
                 f"the machine was restarted: files of its last minute made again: {doubtful}"
             )
-        number, size = recovery.remove_temporary(self.results, lock.since)
+        number, size = remove_temporary(self.results, lock.since)
         if number:
             self._put_right.append(f"temporary files removed: {number} ({size / 1e6:.1f} MB)")
         lock.left_over = {}

@@ -9,10 +9,13 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.extensions.fusion.samples_of_models import (
+    STRETCH,
+    simulate_samples_of_models,
+)
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
-from imubench_pipeline.steps.samples_of_models import STRETCH, simulate_samples_of_models
 from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from imubench_pipeline.extensions.fusion.samples_of_models import simulate_samples_of_models
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.samples_of_models import simulate_samples_of_models
 from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
