@@ -6,6 +6,7 @@ import sys
 import time
 from functools import partial
 
+from snakemake.io import IOFile
 from snakemake.iocontainers import Wildcards
 from snakemake.sourcecache import infer_source_file
 from snakemake.utils import update_config
@@ -23,7 +24,11 @@ from imubench_pipeline.run.resources import (
     make_step_limits,
 )
 from imubench_pipeline.run.scripts import Scripts
-from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
+from imubench_pipeline.run.sealing import (
+    digest_settings,
+    find_unsound_jobs,
+    limit_wildcards,
+)
 from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
@@ -192,8 +197,8 @@ def own_rules():
 
 
 def jobs():
-    """The first output and the settings of every job of this run, by the place of its seal."""
-    found = {}
+    """The wildcards and the settings of every job of this run, by the place of its seal."""
+    found, digests = {}, {}
     for step, rule in own_rules().items():
         for of in jobs_of(step, rule):
             wildcards = Wildcards(fromdict=of)
@@ -202,10 +207,9 @@ def jobs():
                 for name, value in rule.params.items()
                 if name != "attempt"
             }
-            found[name_place(step, *of.values())] = (
-                str(rule.output[0].apply_wildcards(of)),
-                digest_settings(params),
-            )
+            key = tuple(map(str, params.values()))
+            digests[key] = digests.get(key) or digest_settings(params)
+            found[name_place(step, *of.values())] = of, digests[key]
     return found
 
 
@@ -236,17 +240,42 @@ def made_again(wildcards):
     It does so by itself for what is missing and needed by a step that runs, and not for what is
     another file, or is damaged.
     """
-    every = jobs()
+    every, own = jobs(), own_rules()
     held_back = {
         name_place("ingest", *key)
         for key, log in plan.recordings.items()
         if log.held_back
     }
     settings = {place: digest for place, (_, digest) in every.items()}
-    files = [
-        every[place][0]
+    unsound = {
+        place: every[place][0]
         for place in find_unsound_jobs(plan.run.results, settings)
         if place not in held_back
+    }
+    files = [
+        str(own[place.split("/")[-1]].output[0].apply_wildcards(of))
+        for place, of in unsound.items()
     ]
     workflow.dag.forcefiles.update(files)
+    leave_out_sound([*unsound.values(), *plan.repeated_jobs()])
     return files
+
+
+def leave_out_sound(pending):
+    """Let Snakemake see no jobs of sensors and recordings of which none is pending.
+
+    Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
+    """
+    asked = workflow.dag_settings
+    if workflow.dryrun:  # groups are of clusters; to check them takes a third of the time
+        for made in own_rules().values():
+            made.group = None
+    if workflow.executor_plugin is None or workflow.touch or any(
+        (asked.forceall, asked.forcerun, asked.until, asked.omit_from, asked.batch)
+    ):
+        return
+    for made in own_rules().values():
+        for place, file in enumerate(made.output):
+            left = IOFile(limit_wildcards(str(file), pending), rule=made)
+            left.clone_flags(file)
+            made.output[place] = left

@@ -79,6 +79,7 @@ class Plan:
         self.boards: dict[str, simulations.Board] = simulated.boards
         self.simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
+        self._of_error_budget: dict[str, str] = {}
         self._read_notes: dict[Path, object] = {}
         self._still_written: list[Recording] = []
         self.recordings: dict[tuple[str, str], Recording] = {}
@@ -153,6 +154,14 @@ class Plan:
         """Return the attempt of a step (`Faults.attempt`), the last one if it is held back."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
+
+    def repeated_jobs(self) -> list[dict[str, str]]:
+        """Return sensor and recording of the steps that are tried again."""
+        ready = [key for key, log in self.recordings.items() if not log.held_back]
+        return [
+            {"sensor": sensor} | ({"recording": name} if name else {})
+            for sensor, name in self.faults.repeated(ready)
+        ]
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""
@@ -349,15 +358,16 @@ class Plan:
 
     def error_budget_settings(self, sensor: str) -> str:
         """Return the settings of the error budget of a sensor, with its printed figures."""
-        declared = self.sensors.get(sensor)
-        return to_json(
-            {
-                "error_budget": self.run.error_budget,
-                "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
-                "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
-                "figures": state_figures(declared),
-            }
-        )
+        if sensor not in self._of_error_budget:
+            self._of_error_budget[sensor] = to_json(
+                {
+                    "error_budget": self.run.error_budget,
+                    "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
+                    "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
+                    "figures": state_figures(self.sensors.get(sensor)),
+                }
+            )
+        return self._of_error_budget[sensor]
 
     def ranking_settings(self) -> str:
         """Return the settings of the ranking: requirements, and sensors that are for sale."""
