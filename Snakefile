@@ -34,6 +34,7 @@ onstart:
         partial(describe_outcome, plan.run.results),
     )
     remove_temporary(plan.run.results, BEGUN)
+    plan.remove_unused_csv()
 
 
 # Tables are read at the end of a run alone: a run should begin at once.

@@ -167,7 +167,7 @@ def table(name):
 def as_files(*tables):
     """Tables of all sensors as they are written, by name."""
     return {
-        name: [f"{RESULTS}/tables/{name}.{kind}" for kind in ("parquet", "csv")]
+        name: [table(name)] + [f"{RESULTS}/tables/{name}.csv"] * plan.writes_csv(name)
         for name in tables
     }
 
@@ -267,11 +267,17 @@ def leave_out_sound(pending):
     Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
     """
     asked = workflow.dag_settings
-    if workflow.dryrun:  # groups are of clusters; to check them takes a third of the time
+    if (
+        workflow.dryrun
+    ):  # groups are of clusters; to check them takes a third of the time
         for made in own_rules().values():
             made.group = None
-    if workflow.executor_plugin is None or workflow.touch or any(
-        (asked.forceall, asked.forcerun, asked.until, asked.omit_from, asked.batch)
+    if (
+        workflow.executor_plugin is None
+        or workflow.touch
+        or any(
+            (asked.forceall, asked.forcerun, asked.until, asked.omit_from, asked.batch)
+        )
     ):
         return
     for made in own_rules().values():

@@ -16,6 +16,7 @@ rule tables:
         **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
     params:
         software=plan.describe_software(),
+        csv=plan.run.tables.csv,
         code=plan.code("tables"),
     script:
         "../scripts/tables.py"
@@ -34,6 +35,7 @@ rule files:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.1)),
     params:
+        csv=plan.run.tables.csv,
         files=plan.files(),
         code=plan.code("files"),
     script:
@@ -57,6 +59,7 @@ rule ranking:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.ranking_settings(),
         code=plan.code("ranking"),
     script:
@@ -77,6 +80,7 @@ rule shortlist:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.2, time=3, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.ranking_settings(),
         catalogue=plan.catalogue(
             "price_class", "sold", "temperature_range", "rate", "mass", "power"
@@ -99,6 +103,7 @@ rule repeatability:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.settings("datasheet"),
         catalogue=plan.catalogue(),
         code=plan.code("repeatability"),
@@ -116,6 +121,7 @@ rule catalogue:
     resources:
         **cost(Cost(memory=300, time=1)),
     params:
+        csv=plan.run.tables.csv,
         catalogue=plan.catalogue("aliases", "grade", "technology", "sold"),
         code=plan.code("catalogue"),
     script:

@@ -211,7 +211,7 @@ def count_files(files: Sequence[FileRow]) -> Iterator[str]:
     for row in skipped[:_MOST_LINES]:
         yield escape_invisible(f"  skipped: {row.file}: {row.reason}")
     if (more := len(skipped) - _MOST_LINES) > 0:
-        yield f"  and {more} more in tables/files.csv"
+        yield f"  and {more} more in the table files"
 
 
 def _list_changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:

@@ -34,6 +34,7 @@ from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables.provenance import digest_sources
+from imubench_pipeline.tables.schemas import BY_RECORDING, TABLES
 from imubench_pipeline.tables.seals import compute_digest
 from imubench_pipeline.units import parse_quantity
 
@@ -406,6 +407,7 @@ class Plan:
                 "report": self.run.report,
                 "results": str(self.run.results),
                 "logs": str(self.run.logs),
+                "csv": sorted(filter(self.writes_csv, TABLES)),
                 "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": self.run.model_dump(mode="json", include=_REPORTED_SECTIONS),
                 "sensors": self._described("vendor", "model", "price_class", "sold"),
@@ -425,6 +427,17 @@ class Plan:
                 },
             }
         )
+
+    def writes_csv(self, table: str) -> bool:
+        """Return whether a joint table is also written as CSV."""
+        csv = self.run.tables.csv
+        return csv == "all" or (csv == "sensors" and table not in BY_RECORDING)
+
+    def remove_unused_csv(self) -> None:
+        """Remove the joint tables as CSV of an earlier run that the settings now leave out."""
+        for path in (self.run.results / "tables").glob("*.csv"):
+            if path.stem in TABLES and not self.writes_csv(path.stem):
+                path.unlink(missing_ok=True)
 
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""

@@ -28,7 +28,7 @@ from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.typing import JsonObject
 
 _SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
-_SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
+_SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "tables", "report"}
 
 
 _Section = TypeVar("_Section", bound=BaseModel)
@@ -175,6 +175,16 @@ class LimitSettings(Strict):
     )
 
 
+class TablesSettings(Strict):
+    """The joint tables of all sensors, which are always written as Parquet."""
+
+    csv: Literal["all", "sensors", "none"] = Field(
+        "all",
+        description="tables that are also written as CSV; sensors: those without rows of single "
+        "recordings",
+    )
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -228,6 +238,7 @@ class Run(WithBlocks):
     decide: DecideSettings = DecideSettings()
     fusion: FusionSettings = FusionSettings()
     limits: LimitSettings = LimitSettings()
+    tables: TablesSettings = TablesSettings()
     report: ReportSettings = ReportSettings()
 
     def section(self, model: type[_Section]) -> _Section:
