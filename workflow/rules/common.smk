@@ -11,7 +11,7 @@ from snakemake.iocontainers import Wildcards
 from snakemake.sourcecache import infer_source_file
 from snakemake.utils import update_config
 
-from imubench_pipeline.recordings.kept import describe_outcome
+from imubench_pipeline.recordings.kept import describe_outcome, remove_old_samples
 from imubench_pipeline.registry import files_of, references
 from imubench_pipeline.report.folder import count_attempt
 from imubench_pipeline.report.run_summary import describe_drop_zone
@@ -93,6 +93,7 @@ def say_if_idle():
         workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
     )
     if is_run and not len(workflow.dag):
+        remove_samples()
         for line in describe_drop_zone(plan.run.results):
             print(line, file=sys.stderr)
 
@@ -183,6 +184,9 @@ ADDED_TABLES = {}
 ADDED_OUTPUTS = []
 """Outputs of extensions that a run makes, and no other rule reads."""
 
+SAMPLED = set()
+"""Sensors of which a step reads the samples of all recordings: they stay."""
+
 JOBS = {}
 """The wildcards of the jobs of a step that is not of every sensor or recording."""
 
@@ -198,8 +202,9 @@ def own_rules():
 
 def jobs():
     """The wildcards and the settings of every job of this run, by the place of its seal."""
-    found, digests = {}, {}
+    found = {}
     for step, rule in own_rules().items():
+        digests = {}
         for of in jobs_of(step, rule):
             wildcards = Wildcards(fromdict=of)
             params = {
@@ -252,13 +257,43 @@ def made_again(wildcards):
         for place in find_unsound_jobs(plan.run.results, settings)
         if place not in held_back
     }
+    pending = [*unsound.values(), *plan.repeated_jobs()]
+    unsound |= plan.list_ingests_without_samples(pending)
     files = [
         str(own[place.split("/")[-1]].output[0].apply_wildcards(of))
         for place, of in unsound.items()
     ]
     workflow.dag.forcefiles.update(files)
-    leave_out_sound([*unsound.values(), *plan.repeated_jobs()])
+    leave_out_sound(pending)
     return files
+
+
+def remove_samples():
+    """Remove the samples that the settings do not keep, where no job is left to do."""
+    keep = plan.run.samples.keep
+    if keep == "all":
+        return
+    take_lock()
+    every = jobs()
+    settings = {place: digest for place, (_, digest) in every.items()}
+    needed = {
+        tuple(every[place][0].values())
+        for place in find_unsound_jobs(plan.run.results, settings)
+    }
+    needed |= {(failure.sensor, failure.recording) for failure, _ in plan.faults.now()}
+    number, size = remove_old_samples(
+        (
+            Path(KEPT.format(sensor=sensor, recording=name))
+            for sensor, name in plan.recordings
+            if {(sensor, name), (sensor,)}.isdisjoint(needed) and sensor not in SAMPLED
+        ),
+        keep,
+    )
+    if number:
+        print(
+            f"samples of {number} recordings were removed ({size / 1e6:.3g} MB)",
+            file=sys.stderr,
+        )
 
 
 def leave_out_sound(pending):
@@ -267,9 +302,8 @@ def leave_out_sound(pending):
     Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
     """
     asked = workflow.dag_settings
-    if (
-        workflow.dryrun
-    ):  # groups are of clusters; to check them takes a third of the time
+    # Groups are of clusters; a dry run would take a third of its time to check them.
+    if workflow.dryrun:
         for made in own_rules().values():
             made.group = None
     if (

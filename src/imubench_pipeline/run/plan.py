@@ -9,6 +9,7 @@ import json
 import os
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cached_property, partial
 from importlib.metadata import version
@@ -22,6 +23,7 @@ from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
 from imubench_pipeline.navigation.error_budget.in_use import state_figures
 from imubench_pipeline.navigation.suitability import read_abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
@@ -33,9 +35,10 @@ from imubench_pipeline.settings.requirements import Requirement, read_requiremen
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.tables.schemas import BY_RECORDING, TABLES
-from imubench_pipeline.tables.seals import compute_digest
+from imubench_pipeline.tables.seals import compute_digest, name_place
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
@@ -163,6 +166,20 @@ class Plan:
             {"sensor": sensor} | ({"recording": name} if name else {})
             for sensor, name in self.faults.repeated(ready)
         ]
+
+    def list_ingests_without_samples(
+        self, jobs: Iterable[Mapping[str, str]]
+    ) -> dict[str, Mapping[str, str]]:
+        """Return the ingests of jobs whose samples were removed, by the place of their seals."""
+        again = {}
+        for job in jobs:
+            key = (job.get("sensor", ""), job.get("recording", ""))
+            if key in self.recordings and not self.recordings[key].held_back:
+                folder = self.run.results.joinpath("recordings", *key)
+                with suppress(OSError, RecordingError):  # it is made in any case
+                    if Quality.read(folder / "quality.json").has_removed_samples(folder):
+                        again[name_place("ingest", *key)] = job
+        return again
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""

@@ -154,6 +154,8 @@ class Results:
             yield self._fault(name, f"expected the file of {place}, found the file of {of}", step)
         samples = quality.kept or {}
         for file, stated in samples.items():
+            if stated.is_removed(path.with_name(file)):
+                continue
             expected = sealing.SealedFile(stated.size, stated.sha256, 0)
             if words := expected.fault(path.with_name(file), whole=True):
                 yield self._fault(f"{place}/{file}", words, step)
