@@ -31,6 +31,7 @@ from imubench_pipeline.run.sealing import (
 )
 from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables.files import locate_table
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
 from imubench_pipeline.tables.seals import name_place
 
@@ -162,13 +163,14 @@ def of_each_sensor(table, sensors=FOLDERS):
 
 def table(name):
     """A table of all sensors."""
-    return f"{RESULTS}/tables/{name}.parquet"
+    return str(locate_table(plan.run.results, name))
 
 
 def as_files(*tables):
     """Tables of all sensors as they are written, by name."""
     return {
-        name: [table(name)] + [f"{RESULTS}/tables/{name}.csv"] * plan.writes_csv(name)
+        name: [directory(table(name)) if plan.has_parts(name) else table(name)]
+        + [f"{RESULTS}/tables/{name}.csv"] * plan.writes_csv(name)
         for name in tables
     }
 

@@ -17,6 +17,7 @@ rule tables:
     params:
         software=plan.describe_software(),
         csv=plan.run.tables.csv,
+        parts=[name for name in TABLES if plan.has_parts(name)],
         code=plan.code("tables"),
     script:
         "../scripts/tables.py"

@@ -450,6 +450,10 @@ class Plan:
         csv = self.run.tables.csv
         return csv == "all" or (csv == "sensors" and table not in BY_RECORDING)
 
+    def has_parts(self, table: str) -> bool:
+        """Return whether a joint table is a folder with a file for each sensor and month."""
+        return table in BY_RECORDING and len(self.recordings) > self.run.tables.parts_above
+
     def remove_unused_csv(self) -> None:
         """Remove the joint tables as CSV of an earlier run that the settings now leave out."""
         for path in (self.run.results / "tables").glob("*.csv"):

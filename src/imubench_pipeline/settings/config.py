@@ -193,6 +193,12 @@ class TablesSettings(Strict):
         description="tables that are also written as CSV; sensors: those without rows of single "
         "recordings",
     )
+    parts_above: int = Field(
+        1000,
+        ge=0,
+        description="number of recordings above which a table with rows of recordings is a folder, "
+        "with a file for each sensor and month",
+    )
 
 
 class ReportSettings(Strict):

@@ -174,9 +174,31 @@ def write_arrow(table: pa.Table, path: Path) -> None:
             write_sealed(table, temporary, compression)
 
 
+def link_part(name: str, part: pa.Table, stored: Path, folder: Path) -> None:
+    """Put a part of a table into a folder, as a link to a stored file.
+
+    That file is written only if its rows are others, or damaged.
+    """
+    try:
+        is_same = read_part(name, stored).equals(part)
+    except (OSError, TableError):
+        is_same = False
+    if not is_same:
+        write_arrow(part, stored)
+    try:
+        (folder / stored.name).hardlink_to(stored)
+    except OSError:  # a disk without links
+        shutil.copy2(stored, folder / stored.name)
+
+
 def write_csv(table: pa.Table, file: BinaryIO) -> None:
     """Write a table as CSV: texts are no formulas, lists are joined by ``;``, structs are JSON."""
     pacsv.write_csv(escape_cells(table), file)
+
+
+def locate_table(results: Path, table: str) -> Path:
+    """Return the path of a joint table of a run: a file, or a folder with parts of it."""
+    return results / "tables" / f"{table}.parquet"
 
 
 def find_tables_folder(results: Path) -> Path:
@@ -192,7 +214,7 @@ def find_tables(results: Path, names: Iterable[str]) -> dict[str, Path]:
     """
     folder = find_tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in names}
-    if missing := [name for name, path in paths.items() if not path.is_file()]:
+    if missing := [name for name, path in paths.items() if not path.exists()]:
         raise TableError(
             f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
             "finished run, such as results: `snakemake -c2` makes it"
@@ -213,10 +235,12 @@ def join_tables(table: str, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def read_part(table: str, path: Path) -> pa.Table:
-    """Read one file of a table, with its metadata.
+    """Read one file of a table, with its metadata, or a folder with parts of it, in order.
 
     Raises a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
+    if path.is_dir():
+        return join_tables(table, [read_part(table, part) for part in sorted(path.iterdir())])
     part, expected = _load_part(path), make_schema(table)
     if other := _other_columns(part.schema, expected):
         raise TableError(
