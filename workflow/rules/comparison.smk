@@ -16,7 +16,7 @@ rule tables:
         **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
     params:
         software=plan.describe_software(),
-        csv=plan.run.tables.csv,
+        csv=[name for name in TABLES if plan.writes_csv(name)],
         parts=[name for name in TABLES if plan.has_parts(name)],
         code=plan.code("tables"),
     script:

@@ -12,7 +12,7 @@ if __name__ == "__main__":
     joined = join_all_tables(inputs)
     for output in map(Path, snakemake.output):
         if output.suffix == ".json":
-            write_json(describe_tables(json.loads(params.software)), output)
+            write_json(describe_tables(json.loads(params.software), params.csv), output)
         elif output.suffix == ".parquet" and output.stem in params.parts:
             write_parts(joined[output.stem], output, joined["recordings"])
         else:

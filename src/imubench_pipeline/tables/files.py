@@ -239,8 +239,6 @@ def read_part(table: str, path: Path) -> pa.Table:
 
     Raises a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
-    if path.is_dir():
-        return join_tables(table, [read_part(table, part) for part in sorted(path.iterdir())])
     part, expected = _load_part(path), make_schema(table)
     if other := _other_columns(part.schema, expected):
         raise TableError(
@@ -281,6 +279,10 @@ def read_any_version(table: str, path: Path) -> pa.Table:
 
 
 def _load_part(path: Path) -> pa.Table:
+    """Return the rows of a file, or of all files of a folder in order, and its metadata."""
+    if path.is_dir():
+        parts = [_load_part(part) for part in sorted(path.iterdir())]
+        return pa.concat_tables(parts) if parts else _load_part(path / "empty.parquet")
     try:
         if path.exists() and not path.is_file():  # a pipe never answers
             raise pa.ArrowInvalid("it is no file")
