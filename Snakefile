@@ -34,6 +34,7 @@ onstart:
         partial(describe_outcome, plan.run.results),
     )
     remove_temporary(plan.run.results, BEGUN)
+    plan.remove_unused_csv()
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
@@ -45,6 +46,7 @@ onsuccess:
     from imubench_pipeline.run.progress import OURS
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
+    remove_samples()
     logger.info(summarise_run(plan.run.results), extra=OURS)
     incomplete = [plan.faults.left_out(), list_failed_pages(plan.run.results)]
     if any(incomplete):

@@ -159,7 +159,7 @@ def _given(plan: Plan, step: str, sensor: str, name: str, recordings: Path) -> S
     }
     outputs = {
         "ingest": ("quality", "envelope", "histogram"),
-        "allan": ("allan",),
+        "allan": ("curve",),
         "estimate": ESTIMATED,
         "reconstruct": ("reconstruction", "scores"),
         "datasheet": ("datasheet", "datasheet_curve"),

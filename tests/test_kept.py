@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.kept import Quality, load_logs, load_static_logs
-from imubench_pipeline.recordings.recording import LogNames
+from imubench_pipeline.recordings.kept import (
+    Quality,
+    load_logs,
+    load_static_logs,
+    remove_old_samples,
+)
+from imubench_pipeline.recordings.recording import LogNames, read_metadata
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
@@ -96,6 +102,47 @@ def test_a_file_that_is_lost_or_cut_is_named_and_made_again(results: Path, damag
     assert run.attempt(("allan", "s", "r")) == 0
     run.succeeded(OF, 1)
     assert run.attempt(OF) == 1  # the same until the end of the run
+
+
+def test_removed_samples_are_no_fault_and_no_step_takes_them_for_a_log(results: Path) -> None:
+    folder = results / "recordings/s/r"
+    log = folder / "log.parquet"
+    data, about = log.read_bytes(), read_metadata(log)
+    assert remove_old_samples([folder], keep=1) == (0, 0)
+    assert log.read_bytes() == data
+    assert remove_old_samples([folder], keep=0) == (1, len(data))
+    assert remove_old_samples([folder], keep=0) == (0, 0)
+    assert log.stat().st_size < len(data) / 5
+    assert replace(read_metadata(log), removed="") == about
+    quality = Quality.read(folder / "quality.json")
+    assert quality.has_removed_samples(folder)
+    assert quality.fault(folder, whole=True) is None
+    assert Faults(results).attempt(OF) == 0
+    with pytest.raises(RecordingError, match=r"samples were removed .*log in the drop zone"):
+        load_logs(folder)
+    for damaged in [*flips(log.read_bytes(), 97)][1:]:  # the first byte is of the format
+        log.write_bytes(damaged)
+        assert quality.fault(folder) is not None
+    log.write_bytes(data)
+    assert quality.fault(folder, whole=True) is None
+    assert not quality.has_removed_samples(folder)
+
+
+def test_the_latest_samples_of_a_device_stay(results: Path) -> None:
+    folders = []
+    for name, device, started in [
+        ("a", "1", "2026-03-02"), ("b", "1", "2026-03-01"), ("c", "2", None),
+        ("d", "d", None), ("e", "e", None), ("f", "f", None),  # no device is named
+    ]:  # fmt: skip
+        folder = results / f"recordings/s/{name}"
+        shutil.copytree(results / "recordings/s/r", folder)
+        quality = Quality.read(folder / "quality.json")
+        row = replace(quality.recording, recording=name, device=device, started=started)
+        replace(quality, recording=row).write(folder / "quality.json")
+        folders.append(folder)
+    assert remove_old_samples(folders, keep=1)[0] == 3
+    kept = [f.name for f in folders if not read_metadata(f / "log.parquet").removed]
+    assert kept == ["a", "c", "f"]
 
 
 def test_an_ingest_that_mended_a_recording_is_not_run_once_more(results: Path) -> None:

@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 import yaml
+from snakemake.io import IOFile
 
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import make_site
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.sealing import limit_wildcards
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import build
 from imubench_pipeline.tables.schemas import TABLES
@@ -272,3 +274,43 @@ def test_names_with_braces_are_no_wildcards_and_reject_themselves_alone(
     assert "{x}" in json.loads(plan.catalogue())
     errors = {log.path.name: bool(log.error) for log in plan.recordings.values()}
     assert errors == {"a.csv": False, "{y}.csv": True, "r#1.csv": True, "r_1.csv": False}
+
+
+@pytest.mark.parametrize(
+    ("csv", "left"),
+    [
+        ("all", {"parameters", "pooled", "not_ours"}),
+        ("sensors", {"pooled", "not_ours"}),
+        ("none", {"not_ours"}),
+    ],
+)
+def test_tables_are_written_as_csv_by_the_setting(
+    project: dict[str, Any], csv: str, left: set[str]
+) -> None:
+    plan = Plan(project | {"tables": {"csv": csv}})
+    folder = Path(project["results"]) / "tables"
+    folder.mkdir(parents=True)
+    for name in ("parameters", "pooled", "not_ours"):
+        (folder / f"{name}.csv").touch()
+        (folder / f"{name}.parquet").touch()
+    plan.remove_unused_csv()
+    assert {path.stem for path in folder.glob("*.csv")} == left
+    assert len([*folder.glob("*.parquet")]) == 3
+    named = set(json.loads(plan.report_settings())["csv"])
+    assert left - {"not_ours"} == named & {"parameters", "pooled"}
+
+
+def test_wildcards_match_the_jobs_to_do_and_no_others() -> None:
+    pattern = "r/{sensor,[^/]+}/{recording,[^/]+}/log.json"
+    names = ["run 1", "a.b", "{x}", "n,2", "(c)+", "äö"]
+    jobs = [{"sensor": "s"}, *({"sensor": "t", "recording": name} for name in names)]
+    file = IOFile(limit_wildcards(pattern, jobs))
+    for sensor in ("s", "t"):
+        for name in names:
+            found = file.match(f"r/{sensor}/{name}/log.json")
+            assert found and found.groupdict() == {"sensor": sensor, "recording": name}
+    for other in ("r/s/run 2/log.json", "r/s/aXb/log.json", "r/u/a.b/log.json"):
+        assert not file.match(other)
+    assert not IOFile(limit_wildcards(pattern, [])).match("r/s/a.b/log.json")
+    many = [{"sensor": "s", "recording": f"night_{number}"} for number in range(201)]
+    assert "{recording,[^/]+}" in limit_wildcards(pattern, many)

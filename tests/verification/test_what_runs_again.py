@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import imubench_pipeline
+from imubench_pipeline.recordings.kept import remove_old_samples
 from tests.conftest import few
 from tests.verification.finished import (
     REQUIREMENT,
@@ -151,6 +152,18 @@ def test_an_edit_of_a_layout_runs_the_logs_of_its_sensor(project: Project) -> No
 def test_an_edit_of_a_bandwidth_runs_the_estimates_of_its_sensor(project: Project) -> None:
     put_two(project.folder, bandwidth="40 Hz")
     assert project.job_list() == steps_of(*TWO, since="estimate")
+
+
+def test_removed_samples_are_read_again_only_for_a_step_that_needs_them(project: Project) -> None:
+    folders = [project.results / f"recordings/{name}" for name in ALL]
+    files = [path for folder in folders for path in folder.glob("log*.parquet")]
+    with contextlib.ExitStack() as stack:
+        for path in files:
+            stack.enter_context(restored(path))
+        assert remove_old_samples(folders, 0)[0] == len(ALL)
+        assert project.job_list() == set()
+        put_two(project.folder, bandwidth="40 Hz")  # with all samples, only since the estimate
+        assert project.job_list() == steps_of(*TWO)
 
 
 def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:

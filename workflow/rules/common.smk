@@ -6,11 +6,12 @@ import sys
 import time
 from functools import partial
 
+from snakemake.io import IOFile
 from snakemake.iocontainers import Wildcards
 from snakemake.sourcecache import infer_source_file
 from snakemake.utils import update_config
 
-from imubench_pipeline.recordings.kept import describe_outcome
+from imubench_pipeline.recordings.kept import describe_outcome, remove_old_samples
 from imubench_pipeline.registry import files_of, references
 from imubench_pipeline.report.folder import count_attempt
 from imubench_pipeline.report.run_summary import describe_drop_zone
@@ -23,9 +24,14 @@ from imubench_pipeline.run.resources import (
     make_step_limits,
 )
 from imubench_pipeline.run.scripts import Scripts
-from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
+from imubench_pipeline.run.sealing import (
+    digest_settings,
+    find_unsound_jobs,
+    limit_wildcards,
+)
 from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables.files import locate_table
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
 from imubench_pipeline.tables.seals import name_place
 
@@ -88,6 +94,7 @@ def say_if_idle():
         workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
     )
     if is_run and not len(workflow.dag):
+        remove_samples()
         for line in describe_drop_zone(plan.run.results):
             print(line, file=sys.stderr)
 
@@ -156,13 +163,14 @@ def of_each_sensor(table, sensors=FOLDERS):
 
 def table(name):
     """A table of all sensors."""
-    return f"{RESULTS}/tables/{name}.parquet"
+    return str(locate_table(plan.run.results, name))
 
 
 def as_files(*tables):
     """Tables of all sensors as they are written, by name."""
     return {
-        name: [f"{RESULTS}/tables/{name}.{kind}" for kind in ("parquet", "csv")]
+        name: [directory(table(name)) if plan.has_parts(name) else table(name)]
+        + [f"{RESULTS}/tables/{name}.csv"] * plan.writes_csv(name)
         for name in tables
     }
 
@@ -178,6 +186,9 @@ ADDED_TABLES = {}
 ADDED_OUTPUTS = []
 """Outputs of extensions that a run makes, and no other rule reads."""
 
+SAMPLED = set()
+"""Sensors of which a step reads the samples of all recordings: they stay."""
+
 JOBS = {}
 """The wildcards of the jobs of a step that is not of every sensor or recording."""
 
@@ -192,9 +203,10 @@ def own_rules():
 
 
 def jobs():
-    """The first output and the settings of every job of this run, by the place of its seal."""
+    """The wildcards and the settings of every job of this run, by the place of its seal."""
     found = {}
     for step, rule in own_rules().items():
+        digests = {}
         for of in jobs_of(step, rule):
             wildcards = Wildcards(fromdict=of)
             params = {
@@ -202,10 +214,9 @@ def jobs():
                 for name, value in rule.params.items()
                 if name != "attempt"
             }
-            found[name_place(step, *of.values())] = (
-                str(rule.output[0].apply_wildcards(of)),
-                digest_settings(params),
-            )
+            key = tuple(map(str, params.values()))
+            digests[key] = digests.get(key) or digest_settings(params)
+            found[name_place(step, *of.values())] = of, digests[key]
     return found
 
 
@@ -236,17 +247,77 @@ def made_again(wildcards):
     It does so by itself for what is missing and needed by a step that runs, and not for what is
     another file, or is damaged.
     """
-    every = jobs()
+    every, own = jobs(), own_rules()
     held_back = {
         name_place("ingest", *key)
         for key, log in plan.recordings.items()
         if log.held_back
     }
     settings = {place: digest for place, (_, digest) in every.items()}
-    files = [
-        every[place][0]
+    unsound = {
+        place: every[place][0]
         for place in find_unsound_jobs(plan.run.results, settings)
         if place not in held_back
+    }
+    pending = [*unsound.values(), *plan.repeated_jobs()]
+    unsound |= plan.list_ingests_without_samples(pending)
+    files = [
+        str(own[place.split("/")[-1]].output[0].apply_wildcards(of))
+        for place, of in unsound.items()
     ]
     workflow.dag.forcefiles.update(files)
+    leave_out_sound(pending)
     return files
+
+
+def remove_samples():
+    """Remove the samples that the settings do not keep, where no job is left to do."""
+    keep = plan.run.samples.keep
+    if keep == "all":
+        return
+    take_lock()
+    every = jobs()
+    settings = {place: digest for place, (_, digest) in every.items()}
+    needed = {
+        tuple(every[place][0].values())
+        for place in find_unsound_jobs(plan.run.results, settings)
+    }
+    needed |= {(failure.sensor, failure.recording) for failure, _ in plan.faults.now()}
+    number, size = remove_old_samples(
+        (
+            Path(KEPT.format(sensor=sensor, recording=name))
+            for sensor, name in plan.recordings
+            if {(sensor, name), (sensor,)}.isdisjoint(needed) and sensor not in SAMPLED
+        ),
+        keep,
+    )
+    if number:
+        print(
+            f"samples of {number} recordings were removed ({size / 1e6:.3g} MB)",
+            file=sys.stderr,
+        )
+
+
+def leave_out_sound(pending):
+    """Let Snakemake see no jobs of sensors and recordings of which none is pending.
+
+    Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
+    """
+    asked = workflow.dag_settings
+    # Groups are of clusters; a dry run would take a third of its time to check them.
+    if workflow.dryrun:
+        for made in own_rules().values():
+            made.group = None
+    if (
+        workflow.executor_plugin is None
+        or workflow.touch
+        or any(
+            (asked.forceall, asked.forcerun, asked.until, asked.omit_from, asked.batch)
+        )
+    ):
+        return
+    for made in own_rules().values():
+        for place, file in enumerate(made.output):
+            left = IOFile(limit_wildcards(str(file), pending), rule=made)
+            left.clone_flags(file)
+            made.output[place] = left

@@ -16,6 +16,8 @@ rule tables:
         **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
     params:
         software=plan.describe_software(),
+        csv=[name for name in TABLES if plan.writes_csv(name)],
+        parts=[name for name in TABLES if plan.has_parts(name)],
         code=plan.code("tables"),
     script:
         "../scripts/tables.py"
@@ -34,6 +36,7 @@ rule files:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.1)),
     params:
+        csv=plan.run.tables.csv,
         files=plan.files(),
         code=plan.code("files"),
     script:
@@ -57,6 +60,7 @@ rule ranking:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.ranking_settings(),
         code=plan.code("ranking"),
     script:
@@ -77,6 +81,7 @@ rule shortlist:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.2, time=3, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.ranking_settings(),
         catalogue=plan.catalogue(
             "price_class", "sold", "temperature_range", "rate", "mass", "power"
@@ -99,6 +104,7 @@ rule repeatability:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.settings("datasheet"),
         catalogue=plan.catalogue(),
         code=plan.code("repeatability"),
@@ -116,6 +122,7 @@ rule catalogue:
     resources:
         **cost(Cost(memory=300, time=1)),
     params:
+        csv=plan.run.tables.csv,
         catalogue=plan.catalogue("aliases", "grade", "technology", "sold"),
         code=plan.code("catalogue"),
     script:

@@ -25,6 +25,7 @@ rule sensor_tables:
             )
         ),
     params:
+        recordings=lambda w: [folder.rsplit("/", 1)[1] for folder in FOLDERS[w.sensor]],
         truths=lambda w: plan.truths(w.sensor),
         sensor=lambda w: plan.sensor_file(w.sensor, "price_class", "sold"),
         usual=plan.usual,

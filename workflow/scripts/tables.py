@@ -3,14 +3,17 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.steps.tables import describe_tables, join_all_tables
+from imubench_pipeline.steps.tables import describe_tables, join_all_tables, write_parts
 from imubench_pipeline.tables.files import write_arrow, write_json
 
 if __name__ == "__main__":
-    parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
-    joined = join_all_tables(parts)
+    inputs = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
+    params = snakemake.params
+    joined = join_all_tables(inputs)
     for output in map(Path, snakemake.output):
         if output.suffix == ".json":
-            write_json(describe_tables(json.loads(snakemake.params.software)), output)
+            write_json(describe_tables(json.loads(params.software), params.csv), output)
+        elif output.suffix == ".parquet" and output.stem in params.parts:
+            write_parts(joined[output.stem], output, joined["recordings"])
         else:
             write_arrow(joined[output.stem], output)

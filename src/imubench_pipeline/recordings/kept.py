@@ -1,5 +1,6 @@
 """Load ingested samples; refuse altered ones."""
 
+import contextlib
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -7,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 from pydantic import TypeAdapter
 
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
@@ -18,11 +20,13 @@ from imubench_pipeline.recordings.recording import (
     SampleCounts,
     list_log_files,
     open_channel_logs,
+    read_metadata,
+    remove_samples,
     was_at_rest,
 )
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.parquet import read_footer
+from imubench_pipeline.tables.parquet import SEAL, is_seal_broken, read_footer
 from imubench_pipeline.tables.seals import compute_digest, read_sealed_json, write_sealed_json
 
 
@@ -41,6 +45,14 @@ class KeptFile:
     size: int
     footer: str
     sha256: str
+
+    def is_removed(self, path: Path) -> bool:
+        """Return whether a file has the metadata of this one, whose samples were removed."""
+        try:
+            sealed = SEAL in read_footer(path) and not is_seal_broken(path)
+            return sealed and read_metadata(path).removed == self.sha256
+        except (OSError, ValueError, KeyError, pa.ArrowException):
+            return False
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,10 @@ class Quality:
         except ValueError as error:  # other letters, or other keys
             raise RecordingError(f"{path}: was changed after the ingest: {MEND}") from error
 
+    def has_removed_samples(self, folder: Path) -> bool:
+        """Return whether samples in a folder were removed to save space."""
+        return any(stated.is_removed(folder / name) for name, stated in (self.kept or {}).items())
+
     def write(self, path: Path) -> None:
         """Write the file, atomically."""
         write_sealed_json(asdict(self), path)
@@ -80,6 +96,8 @@ class Quality:
             path = folder / name
             try:
                 if path.stat().st_size != stated.size:
+                    if stated.is_removed(path):
+                        continue
                     wrong = f"has {path.stat().st_size} bytes instead of {stated.size}"
                 elif _footer(path) != stated.footer or (
                     whole and compute_digest(path) != stated.sha256
@@ -130,6 +148,37 @@ def _footer(path: Path) -> str:
     return hashlib.sha256(read_footer(path)).hexdigest()
 
 
+def remove_old_samples(folders: Iterable[Path], keep: int) -> tuple[int, int]:
+    """Remove the samples of analysed recordings, except the latest ones of each device.
+
+    Recordings whose notes name no device count together, by sensor. Returns how many recordings
+    lost their samples, and the size of these, bytes. Altered samples are left as they are.
+    """
+    devices: dict[tuple[str, str], list[tuple[str, str, Path, Quality]]] = {}
+    for folder in folders:
+        with contextlib.suppress(OSError, RecordingError):
+            quality = Quality.read(folder / "quality.json")
+            about = quality.recording
+            device = "" if about.device == about.recording else about.device
+            listed = devices.setdefault((about.sensor, device), [])
+            listed.append((about.started or "", about.recording, folder, quality))
+    number = size = 0
+    for listed in devices.values():
+        listed.sort(key=lambda one: one[:2])
+        for _, _, folder, quality in listed[: max(len(listed) - keep, 0)]:
+            present = {
+                name: file
+                for name, file in (quality.kept or {}).items()
+                if not file.is_removed(folder / name)
+            }
+            if present and not quality.fault(folder):
+                for name, file in present.items():
+                    remove_samples(folder / name, file.sha256)
+                    size += file.size
+                number += 1
+    return number, size
+
+
 def load_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the usable channels of a recording, by name; none of a rejected one.
 
@@ -138,6 +187,11 @@ def load_logs(folder: Path) -> dict[str, ChannelLog]:
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):
         raise RecordingError(fault)
+    if quality.has_removed_samples(folder):
+        raise RecordingError(
+            f"{folder}: its samples were removed to save space (samples.keep), and this step needs "
+            "them; run again with the log in the drop zone, and the log is read again"
+        )
     if quality.kept is not None:
         for path in list_log_files(folder):
             if path.name not in quality.kept:

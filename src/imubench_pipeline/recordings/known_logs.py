@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -64,11 +65,16 @@ class KnownFile:
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
 
+@cache
+def _make_adapter() -> TypeAdapter[dict[str, KnownFile]]:
+    return TypeAdapter(dict[str, KnownFile])
+
+
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         files = seals.read_sealed_json(folder / KNOWN)["files"]
-        return TypeAdapter(dict[str, KnownFile]).validate_python(files)
+        return _make_adapter().validate_python(files)
     return None
 
 

@@ -21,8 +21,9 @@ from pydantic import TypeAdapter
 from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
+from imubench_pipeline.tables.files import replace_file
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.parquet import open_parquet, read_row_group
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group, write_sealed
 from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20  # rows of a row group
@@ -68,6 +69,7 @@ class LogMetadata(LogNames):
     holes: Mapping[str, bool]
     empty: tuple[str, ...] = ()
     unusable: tuple[str, ...] = ()
+    removed: str = ""  # digest of the file that had the samples, if they were removed
 
 
 _METADATA_ADAPTER = TypeAdapter(LogMetadata)  # once: it takes milliseconds
@@ -227,6 +229,14 @@ def read_metadata(path: Path) -> LogMetadata:
     """Return the metadata that `LogWriter.finish` wrote."""
     metadata = pq.read_metadata(path).metadata or {}
     return _METADATA_ADAPTER.validate_json(metadata[METADATA])
+
+
+def remove_samples(path: Path, sha256: str) -> None:
+    """Replace a file of samples, of a SHA-256, by one that has its columns and metadata alone."""
+    metadata = json.loads(pq.read_metadata(path).metadata[METADATA]) | {"removed": sha256}
+    schema = pq.read_schema(path).with_metadata({METADATA: json.dumps(metadata)})
+    with replace_file(path) as temporary:
+        write_sealed(schema.empty_table(), temporary, "snappy")
 
 
 def list_log_files(folder: Path) -> list[Path]:

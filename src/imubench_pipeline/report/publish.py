@@ -34,7 +34,7 @@ from imubench_pipeline.report.search import make_search_index
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.tables.failures import describe_error
-from imubench_pipeline.tables.files import read, read_json, write_content
+from imubench_pipeline.tables.files import locate_table, read, read_json, write_content
 from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.words.estimates import STATUS_WORDS, status_text, symbol_text
@@ -382,7 +382,7 @@ def load_site(results: Path) -> Site:
             f"{', '.join(sorted(missing))}; run snakemake -c2 again, as for these results"
         )
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-    paths = {name: results / f"tables/{name}.parquet" for name in names}
+    paths = {name: locate_table(results, name) for name in names}
     for path in paths.values():
         path.stat()  # its error names the missing file, unlike the error of Parquet
     tables = {name: read(name, [path]) for name, path in paths.items()}

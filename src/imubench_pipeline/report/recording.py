@@ -426,7 +426,8 @@ def describe_recording(
             each = ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
             provenance.append(("Rate per channel", each))
     if row.samples is not None:
-        provenance.append(("Samples", f"{row.samples:,}".replace(",", " ")))
+        removed = " (removed after the analysis)" if metadata and metadata.removed else ""
+        provenance.append(("Samples", f"{row.samples:,}".replace(",", " ") + removed))
     if metadata is not None and len(metadata.segments) > 1:
         provenance.append(("Segments", str(len(metadata.segments))))
     truths = {parameter.source for channel in channels for parameter in channel.truth.values()}

@@ -12,7 +12,7 @@ from imubench_pipeline.model.states import FileStatus
 from imubench_pipeline.recordings.drop_zone import account_for, find_logs
 from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.folder import find_drop_zone, read_failed_pages
-from imubench_pipeline.tables.files import read
+from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import counted, join_names
@@ -40,8 +40,8 @@ _INTERRUPTED = "Terminating processes on user request"
 
 def summarise_run(results: Path) -> str:
     """Return the summary of a finished run; empty without tables."""
-    paths = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
-    if not all(path.is_file() for path in paths.values()):
+    paths = {name: locate_table(results, name) for name in _NEEDED}
+    if not all(path.exists() for path in paths.values()):
         return ""
     try:
         tables = {name: read(name, [path]) for name, path in paths.items()}
@@ -211,7 +211,7 @@ def count_files(files: Sequence[FileRow]) -> Iterator[str]:
     for row in skipped[:_MOST_LINES]:
         yield escape_invisible(f"  skipped: {row.file}: {row.reason}")
     if (more := len(skipped) - _MOST_LINES) > 0:
-        yield f"  and {more} more in tables/files.csv"
+        yield f"  and {more} more in the table files"
 
 
 def _list_changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:

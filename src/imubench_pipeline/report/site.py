@@ -305,6 +305,7 @@ class Site:
             "first_units": choose_first_units(self.system),
             "names": self.names,
             "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),
+            "csv": [] if alone else self.settings.get("csv", [*TABLES]),
             "alone": alone,
             "version": version(_PACKAGE),
             "first_rows": _FIRST_ROWS,

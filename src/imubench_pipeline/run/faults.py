@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -41,6 +41,13 @@ class Faults:
         record = self._before.get(of)
         tried, failed = (record.attempt, record.failed) if record else (0, False)
         return tried + (again and (failed or self._has_lost_samples(of)))
+
+    def repeated(self, recordings: Iterable[tuple[str, str]]) -> set[tuple[str, str | None]]:
+        """Return the sensors and recordings with a step that is tried again."""
+        lost: set[tuple[str, str | None]] = {
+            key for key in recordings if self._has_lost_samples(("ingest", *key))
+        }
+        return self._failed | lost
 
     def _has_lost_samples(self, of: Of) -> bool:
         """Return whether outputs of an ingest were changed; reads all if another step failed."""

@@ -9,6 +9,7 @@ import json
 import os
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import cached_property, partial
 from importlib.metadata import version
@@ -22,6 +23,7 @@ from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
 from imubench_pipeline.navigation.error_budget.in_use import state_figures
 from imubench_pipeline.navigation.suitability import read_abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
@@ -33,8 +35,10 @@ from imubench_pipeline.settings.requirements import Requirement, read_requiremen
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.provenance import digest_sources
-from imubench_pipeline.tables.seals import compute_digest
+from imubench_pipeline.tables.schemas import BY_RECORDING, TABLES
+from imubench_pipeline.tables.seals import compute_digest, name_place
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
@@ -79,6 +83,7 @@ class Plan:
         self.boards: dict[str, simulations.Board] = simulated.boards
         self.simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
+        self._of_error_budget: dict[str, str] = {}
         self._read_notes: dict[Path, object] = {}
         self._still_written: list[Recording] = []
         self.recordings: dict[tuple[str, str], Recording] = {}
@@ -153,6 +158,28 @@ class Plan:
         """Return the attempt of a step (`Faults.attempt`), the last one if it is held back."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
+
+    def repeated_jobs(self) -> list[dict[str, str]]:
+        """Return sensor and recording of the steps that are tried again."""
+        ready = [key for key, log in self.recordings.items() if not log.held_back]
+        return [
+            {"sensor": sensor} | ({"recording": name} if name else {})
+            for sensor, name in self.faults.repeated(ready)
+        ]
+
+    def list_ingests_without_samples(
+        self, jobs: Iterable[Mapping[str, str]]
+    ) -> dict[str, Mapping[str, str]]:
+        """Return the ingests of jobs whose samples were removed, by the place of their seals."""
+        again = {}
+        for job in jobs:
+            key = (job.get("sensor", ""), job.get("recording", ""))
+            if key in self.recordings and not self.recordings[key].held_back:
+                folder = self.run.results.joinpath("recordings", *key)
+                with suppress(OSError, RecordingError):  # it is made in any case
+                    if Quality.read(folder / "quality.json").has_removed_samples(folder):
+                        again[name_place("ingest", *key)] = job
+        return again
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""
@@ -349,15 +376,16 @@ class Plan:
 
     def error_budget_settings(self, sensor: str) -> str:
         """Return the settings of the error budget of a sensor, with its printed figures."""
-        declared = self.sensors.get(sensor)
-        return to_json(
-            {
-                "error_budget": self.run.error_budget,
-                "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
-                "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
-                "figures": state_figures(declared),
-            }
-        )
+        if sensor not in self._of_error_budget:
+            self._of_error_budget[sensor] = to_json(
+                {
+                    "error_budget": self.run.error_budget,
+                    "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
+                    "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
+                    "figures": state_figures(self.sensors.get(sensor)),
+                }
+            )
+        return self._of_error_budget[sensor]
 
     def ranking_settings(self) -> str:
         """Return the settings of the ranking: requirements, and sensors that are for sale."""
@@ -396,6 +424,7 @@ class Plan:
                 "report": self.run.report,
                 "results": str(self.run.results),
                 "logs": str(self.run.logs),
+                "csv": sorted(filter(self.writes_csv, TABLES)),
                 "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": self.run.model_dump(mode="json", include=_REPORTED_SECTIONS),
                 "sensors": self._described("vendor", "model", "price_class", "sold"),
@@ -415,6 +444,21 @@ class Plan:
                 },
             }
         )
+
+    def writes_csv(self, table: str) -> bool:
+        """Return whether a joint table is also written as CSV."""
+        csv = self.run.tables.csv
+        return csv == "all" or (csv == "sensors" and table not in BY_RECORDING)
+
+    def has_parts(self, table: str) -> bool:
+        """Return whether a joint table is a folder with a file for each sensor and month."""
+        return table in BY_RECORDING and len(self.recordings) > self.run.tables.parts_above
+
+    def remove_unused_csv(self) -> None:
+        """Remove the joint tables as CSV of an earlier run that the settings now leave out."""
+        for path in (self.run.results / "tables").glob("*.csv"):
+            if path.stem in TABLES and not self.writes_csv(path.stem):
+                path.unlink(missing_ok=True)
 
     def catalogue(self, *more: str) -> str:
         """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""

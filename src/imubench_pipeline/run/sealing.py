@@ -3,12 +3,15 @@
 import contextlib
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from imubench_pipeline.report.folder import list_report_files
 from imubench_pipeline.run.processes import Job
 from imubench_pipeline.tables import seals as sealed
+
+_MAX_NAMES = 200  # in a pattern: matching more takes longer than the jobs that it leaves out
 
 
 @contextlib.contextmanager
@@ -60,3 +63,17 @@ def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
             or any(file.fault(results / name, whole=False) for name, file in seal.outputs.items())
         ):
             yield place
+
+
+def limit_wildcards(pattern: str, jobs: Sequence[Mapping[str, str]]) -> str:
+    """Return a pattern of outputs whose wildcards match the sensors and recordings of jobs only.
+
+    Wildcards of more than 200 names stay as they are.
+    """
+    for key in ("sensor", "recording"):
+        names = sorted({of[key] for of in jobs if key in of})
+        if len(names) <= _MAX_NAMES:
+            # Braces would end the wildcard.
+            listed = "|".join(re.sub(r"\\[{}]", ".", re.escape(name)) for name in names)
+            pattern = pattern.replace(f"{{{key},[^/]+}}", f"{{{key},{listed or '(?!)'}}}")
+    return pattern

@@ -28,7 +28,7 @@ from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.typing import JsonObject
 
 _SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
-_SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
+_SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "samples", "tables", "report"}
 
 
 _Section = TypeVar("_Section", bound=BaseModel)
@@ -175,6 +175,32 @@ class LimitSettings(Strict):
     )
 
 
+class SamplesSettings(Strict):
+    """The samples of recordings in SI, `log.parquet`, which only the analysis of a log needs."""
+
+    keep: Literal["all"] | Annotated[int, Field(ge=0)] = Field(
+        "all",
+        description="all, or the number of recordings of each device, the latest, whose samples "
+        "stay after a run; a later run that needs others reads their logs again",
+    )
+
+
+class TablesSettings(Strict):
+    """The joint tables of all sensors, which are always written as Parquet."""
+
+    csv: Literal["all", "sensors", "none"] = Field(
+        "all",
+        description="tables that are also written as CSV; sensors: those without rows of single "
+        "recordings",
+    )
+    parts_above: int = Field(
+        1000,
+        ge=0,
+        description="number of recordings above which a table with rows of recordings is a folder, "
+        "with a file for each sensor and month",
+    )
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -228,6 +254,8 @@ class Run(WithBlocks):
     decide: DecideSettings = DecideSettings()
     fusion: FusionSettings = FusionSettings()
     limits: LimitSettings = LimitSettings()
+    samples: SamplesSettings = SamplesSettings()
+    tables: TablesSettings = TablesSettings()
     report: ReportSettings = ReportSettings()
 
     def section(self, model: type[_Section]) -> _Section:

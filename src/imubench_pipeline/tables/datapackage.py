@@ -1,6 +1,6 @@
 """Describe the joined tables of a run for other programs, as a Data Package (datapackage.org)."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,16 @@ _TYPES = {pa.float64(): "number", pa.int64(): "integer", pa.bool_(): "boolean"}
 _RECORDING = ["sensor", "recording"]
 
 
-def describe_tables(software: object) -> dict[str, Any]:
+_CSV = {"format": "csv", "mediatype": "text/csv", "encoding": "utf-8"}
+_PARQUET = {"format": "parquet", "mediatype": "application/vnd.apache.parquet"}
+
+
+def describe_tables(software: object, csv: Container[str] = TABLES) -> dict[str, Any]:
     """Return the descriptor of the joined tables: name, type, unit and meaning of each column.
 
-    It follows version 2.0 of the standard. Resources are the CSV files, in which ``;`` joins lists.
-    Additions to it are ``parquet``, the same table as Parquet, ``unit``, and ``software``.
+    It follows version 2.0 of the standard. Resources are the CSV files, in which ``;`` joins lists,
+    or Parquet for tables that are not in ``csv``. Additions to it are ``parquet``, the same table
+    as Parquet, ``unit``, and ``software``.
     """
     return {
         "$schema": "https://datapackage.org/profiles/2.0/datapackage.json",
@@ -30,10 +35,8 @@ def describe_tables(software: object) -> dict[str, Any]:
             {
                 "name": name,
                 "type": "table",
-                "path": f"{name}.csv",
-                "format": "csv",
-                "mediatype": "text/csv",
-                "encoding": "utf-8",
+                "path": f"{name}.{'csv' if name in csv else 'parquet'}",
+                **(_CSV if name in csv else _PARQUET),
                 "parquet": f"{name}.parquet",
                 "schema": _describe_schema(name),
             }

@@ -174,9 +174,31 @@ def write_arrow(table: pa.Table, path: Path) -> None:
             write_sealed(table, temporary, compression)
 
 
+def link_part(name: str, part: pa.Table, stored: Path, folder: Path) -> None:
+    """Put a part of a table into a folder, as a link to a stored file.
+
+    That file is written only if its rows are others, or damaged.
+    """
+    try:
+        is_same = read_part(name, stored).equals(part)
+    except (OSError, TableError):
+        is_same = False
+    if not is_same:
+        write_arrow(part, stored)
+    try:
+        (folder / stored.name).hardlink_to(stored)
+    except OSError:  # a disk without links
+        shutil.copy2(stored, folder / stored.name)
+
+
 def write_csv(table: pa.Table, file: BinaryIO) -> None:
     """Write a table as CSV: texts are no formulas, lists are joined by ``;``, structs are JSON."""
     pacsv.write_csv(escape_cells(table), file)
+
+
+def locate_table(results: Path, table: str) -> Path:
+    """Return the path of a joint table of a run: a file, or a folder with parts of it."""
+    return results / "tables" / f"{table}.parquet"
 
 
 def find_tables_folder(results: Path) -> Path:
@@ -192,7 +214,7 @@ def find_tables(results: Path, names: Iterable[str]) -> dict[str, Path]:
     """
     folder = find_tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in names}
-    if missing := [name for name, path in paths.items() if not path.is_file()]:
+    if missing := [name for name, path in paths.items() if not path.exists()]:
         raise TableError(
             f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
             "finished run, such as results: `snakemake -c2` makes it"
@@ -213,27 +235,12 @@ def join_tables(table: str, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
-    """Read one file of a table, with its metadata.
+    """Read one file of a table, with its metadata, or a folder with parts of it, in order.
 
     Of ``any_version``, missing columns that may be null are null, and unknown ones left out. Raises
     a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
-    expected = make_schema(table)
-    try:
-        if path.exists() and not path.is_file():  # a pipe never answers
-            raise pa.ArrowInvalid("it is no file")
-        if is_seal_broken(path):
-            raise pa.ArrowInvalid("its metadata were changed")
-        with open_parquet(path) as file:
-            part = file.read(use_threads=False)
-        metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
-        part = part.replace_schema_metadata(metadata)
-    except FileNotFoundError:
-        raise
-    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
-        raise TableError(
-            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
-        ) from error
+    part, expected = _load_part(path), make_schema(table)
     if any_version:
         for field in expected:
             if field.name not in part.column_names and (
@@ -255,6 +262,28 @@ def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
     if part.schema.equals(expected):
         return part
     return part.cast(expected).replace_schema_metadata(part.schema.metadata)
+
+
+def _load_part(path: Path) -> pa.Table:
+    """Return the rows of a file, or of all files of a folder in order, and its metadata."""
+    if path.is_dir():
+        parts = [_load_part(part) for part in sorted(path.iterdir())]
+        return pa.concat_tables(parts) if parts else _load_part(path / "empty.parquet")
+    try:
+        if path.exists() and not path.is_file():  # a pipe never answers
+            raise pa.ArrowInvalid("it is no file")
+        if is_seal_broken(path):
+            raise pa.ArrowInvalid("its metadata were changed")
+        with open_parquet(path) as file:
+            part = file.read(use_threads=False)
+        metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
+        return part.replace_schema_metadata(metadata)
+    except FileNotFoundError:
+        raise
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+        raise TableError(
+            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
+        ) from error
 
 
 def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:

@@ -37,6 +37,7 @@ rule navigate:
         "scripts/navigate.py"
 
 
+SAMPLED.update(list_navigated_sensors(plan))
 JOBS["navigate"] = [{"sensor": sensor} for sensor in list_navigated_sensors(plan)]
 ADDED_TABLES |= {
     name: of_each_sensor(name, list_navigated_sensors(plan))

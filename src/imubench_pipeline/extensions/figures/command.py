@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = {name: find_tables_folder(arguments.results) / f"{name}.parquet" for name in TABLES}
     try:
         find_tables(arguments.results, NEEDED)
-        tables = {name: read(name, [p] if p.is_file() else []) for name, p in paths.items()}
+        tables = {name: read(name, [p] if p.exists() else []) for name, p in paths.items()}
     except (OSError, ValueError) as error:
         raise CommandError(str(error)) from error
     chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)

@@ -17,6 +17,7 @@ rule fusion:
     resources:
         **cost(Cost(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         settings=plan.settings("fusion"),
         catalogue=plan.catalogue("price_class", "sold"),
         code=plan.code("fusion", "extensions.fusion"),

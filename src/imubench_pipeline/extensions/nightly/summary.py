@@ -27,7 +27,7 @@ from imubench_pipeline.run.run_differences import (
     list_differences,
 )
 from imubench_pipeline.tables.datapackage import read_software
-from imubench_pipeline.tables.files import read
+from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
 from imubench_pipeline.words.numbers import Unit
 
@@ -138,7 +138,7 @@ def load_tables(results: Path) -> RunRows:
     """Return the rows of the tables for a state; OSError or ValueError if one is unreadable."""
 
     def rows(of: type[R]) -> list[R]:
-        return of.rows_of(read(of.table, [results / f"tables/{of.table}.parquet"]))
+        return of.rows_of(read(of.table, [locate_table(results, of.table)]))
 
     return RunRows(
         recordings=rows(RecordingRow),

@@ -36,6 +36,7 @@ rule papers:
     resources:
         **cost(Cost(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
     params:
+        csv=plan.run.tables.csv,
         code=plan.code("papers", "extensions.papers"),
     script:
         "scripts/papers.py"

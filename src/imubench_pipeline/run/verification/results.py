@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-import pyarrow.parquet as pq
-
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.project import find_own_snakefile
@@ -154,6 +152,8 @@ class Results:
             yield self._fault(name, f"expected the file of {place}, found the file of {of}", step)
         samples = quality.kept or {}
         for file, stated in samples.items():
+            if stated.is_removed(path.with_name(file)):
+                continue
             expected = sealing.SealedFile(stated.size, stated.sha256, 0)
             if words := expected.fault(path.with_name(file), whole=True):
                 yield self._fault(f"{place}/{file}", words, step)
@@ -223,13 +223,13 @@ class Results:
         }
         for name in sorted(set(TABLES) - set(OF_ONE_RECORDING)):
             place = f"tables/{name}.parquet"
-            left = self.seals["tables"].outputs.get(place)
-            if left is None or left.fault(self.folder / place, whole=False):
+            path, left = self.folder / place, self.seals["tables"].outputs.get(place)
+            if not path.is_dir() and (left is None or left.fault(path, whole=False)):
                 continue  # it is reported
+            if not {"sensor", "recording"} <= {column.name for column in TABLES[name]}:
+                continue
             try:
-                if not {"sensor", "recording"} <= set(pq.read_schema(self.folder / place).names):
-                    continue
-                rows = read(name, [self.folder / place])
+                rows = read(name, [path])
             except (OSError, ValueError):
                 continue  # reported as damaged, or of another version
             keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
