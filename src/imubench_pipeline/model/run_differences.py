@@ -1,7 +1,7 @@
 """Differences between the results of two runs, A and B."""
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 DifferenceKind = Literal[
     "recording_status",
@@ -19,7 +19,8 @@ DifferenceKind = Literal[
 """Kind of a difference, the most important first."""
 
 
-class ResultKey(NamedTuple):
+@dataclass(frozen=True)
+class ResultKey:
     """Identify a result in a run."""
 
     table: Literal["recordings", "parameters", "ranking", "findings"]
@@ -30,7 +31,8 @@ class ResultKey(NamedTuple):
     component: int | None = None  # number of a repeated term, from 1
 
 
-class Result(NamedTuple):
+@dataclass(frozen=True)
+class Result:
     """A result of a run; numbers are in SI."""
 
     state: str  # fitness or status, verdict, severity

@@ -1,13 +1,23 @@
 """Differences between the results of two runs, such as before and after an upgrade."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import get_args
 
+import pyarrow as pa
+
 from imubench_pipeline.model.run_differences import DifferenceKind, Result, ResultKey, RunDifference
 from imubench_pipeline.model.states import Verdict
+from imubench_pipeline.model.table import arrow_type
+from imubench_pipeline.report.practical import System, choose_page_unit
+from imubench_pipeline.report.run_summary import fold_text
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import find_tables, read_any_version
+from imubench_pipeline.words.numbers import Unit
+from imubench_pipeline.words.run_differences import count_text, difference_text
 
 TOLERANCE = 1e-9
 """Relative difference of equal values: other processors round differently."""
@@ -17,6 +27,8 @@ _VERDICTS = (*get_args(Verdict), None)  # the best first; None: no verdict
 _NOT_ANALYSED = ("failed", "rejected")
 _STATES = ("fit", "fit with doubts", "unfit", *_NOT_ANALYSED)  # of a recording, the best first
 _LAST_USED = 1  # index in it
+_WORST = 3  # differences that are described without `every`
+_LONGEST = 400  # characters of one
 
 Results = Mapping[ResultKey, Result]
 
@@ -115,3 +127,41 @@ def _is_inside(value: float, result: Result) -> bool:
 def _rank(difference: RunDifference) -> tuple[bool, int, float]:
     size = math.inf if difference.ratio is None else abs(math.log(difference.ratio))
     return not difference.regression, KINDS.index(difference.kind), -size
+
+
+def make_table(found: Sequence[RunDifference]) -> pa.Table:
+    """Return differences as a table, with columns such as ``sensor``, ``a.value`` and ``ratio``."""
+    rows = [asdict(each) for each in found]
+    table = pa.Table.from_pylist(rows, pa.schema([*arrow_type(RunDifference)])).flatten()
+    return table.rename_columns([name.removeprefix("key.") for name in table.column_names])
+
+
+def describe_runs(path_a: Path, path_b: Path, a: Results, b: Results) -> list[str]:
+    """Return the software of two runs, if known, and the number of their recordings."""
+    lines = [
+        f"{name}: imubench {software.get('version')}, settings {software.get('settings')}"
+        for name, path in (("A", path_a), ("B", path_b))
+        if (software := read_software(path))
+    ]
+    of_a, of_b = ({key for key in run if key.table == "recordings"} for run in (a, b))
+    both = f"{len(of_a & of_b)} in both"
+    return [*lines, f"Recordings: {len(of_a)} in A, {len(of_b)} in B, {both}"]
+
+
+def describe_differences(
+    found: Sequence[RunDifference], system: System, *, every: bool = False
+) -> list[str]:
+    """Return the number of differences of each kind, and the worst or every one in words."""
+    if not found:
+        return ["No differences"]
+    by_kind = [[each for each in found if each.kind == kind] for kind in KINDS]
+    lines = [count_text(kind, some) for kind, some in zip(KINDS, by_kind, strict=True) if some]
+    lines += ["", "The worst differences first:"]
+    shown = found if every else found[:_WORST]
+    for each in shown:
+        unit = Unit("", 1.0)
+        if each.key.table == "parameters":
+            quantity = quantity_of(each.key.channel or "")
+            unit = choose_page_unit(quantity, each.key.name or "", system)
+        lines.append(f"  {fold_text(difference_text(each, unit), _LONGEST)}")
+    return lines + [f"  {len(found) - len(shown)} more"] * (len(found) > len(shown))

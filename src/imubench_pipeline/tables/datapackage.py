@@ -1,12 +1,17 @@
 """Describe the joined tables of a run for other programs, as a Data Package (datapackage.org)."""
 
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from imubench_pipeline.model.table import TypedColumn
+from imubench_pipeline.tables.files import find_tables_folder, read_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, ROWS, TABLES
 
+FILE = "datapackage.json"
 _TYPES = {pa.float64(): "number", pa.int64(): "integer", pa.bool_(): "boolean"}
 _RECORDING = ["sensor", "recording"]
 
@@ -36,6 +41,13 @@ def describe_tables(software: object) -> dict[str, Any]:
             if name not in OF_ONE_RECORDING
         ],
     }
+
+
+def read_software(results: Path) -> Mapping[str, str]:
+    """Return the version of the program and the digest of the settings of a run, if known."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return {**read_json(find_tables_folder(results) / FILE)["software"]}
+    return {}
 
 
 def _describe_schema(name: str) -> dict[str, Any]:

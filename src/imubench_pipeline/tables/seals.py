@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -118,6 +119,7 @@ class Seal:
     inputs: dict[str, str]  # digests by place below the results
     outputs: dict[str, SealedFile]
     settings: str = ""  # digest of the settings and the code
+    version: str = ""  # of the program that made the outputs
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
@@ -146,13 +148,15 @@ def seal_files(
     outputs: Iterable[Path],
     inputs: Mapping[str, str],
     settings: str = "",
+    made_by: str = version("imubench_pipeline"),
 ) -> None:
     """Seal the outputs of a step: files, or folders with all their files.
 
-    ``inputs``: of `compute_digests`; ``settings``: a digest of the settings and code of the step.
+    ``inputs``: of `compute_digests`; ``settings``: a digest of the settings and code of the step;
+    ``made_by``: the version of the program.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
-    Seal(place, compute_form_digest(), dict(inputs), left, settings).write(results)
+    Seal(place, compute_form_digest(), dict(inputs), left, settings, made_by).write(results)
 
 
 def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
@@ -162,7 +166,7 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
     except (FileNotFoundError, SealError):
         return
     inputs = compute_digests(results, (results / name for name in before.inputs))
-    seal_files(results, place, outputs, inputs, before.settings)
+    seal_files(results, place, outputs, inputs, before.settings, before.version)
 
 
 def list_missing_inputs(results: Path, place: str) -> list[str]:
@@ -185,7 +189,7 @@ def read_seal(results: Path, place: str) -> Seal:
         data: Mapping[str, Any] = read_sealed_json(results / name_seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
-        texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
+        texts = [seal.place, seal.form, seal.settings, seal.version, *seal.inputs.values()]
         texts += [file.sha256 for file in outputs.values()]
         numbers = [n for file in outputs.values() for n in (file.size, file.changed)]
         names = [PurePosixPath(name) for name in (*seal.inputs, *outputs)]

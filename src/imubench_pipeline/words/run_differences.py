@@ -43,7 +43,9 @@ def difference_text(difference: RunDifference, unit: Unit) -> str:
     """Return a difference in words; ``unit``: for the values of a parameter."""
     key, a, b = difference.key, difference.a, difference.b
     name = symbol_text(key.name or "").replace("_" if key.table != "parameters" else "\0", " ")
-    place = " ".join(filter(None, ("/".join(filter(None, key[1:3])), key.channel, name)))
+    place = " ".join(
+        filter(None, ("/".join(filter(None, (key.sensor, key.recording))), key.channel, name))
+    )
     place += f" {key.component}" * ((key.component or 1) > 1)
     texts = [_result_text(key.table, result, unit) for result in (a, b)]
     ratio = f" ({number_text(difference.ratio)} times)" * (difference.ratio is not None)

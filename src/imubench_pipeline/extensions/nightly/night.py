@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import termios
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -43,6 +43,12 @@ from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import end_group
+from imubench_pipeline.run.run_differences import (
+    Results,
+    describe_differences,
+    list_differences,
+    load_results,
+)
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import write_content, write_json
@@ -197,6 +203,7 @@ class Night:
                 before = None
                 self._put_right.append(str(error))
             self._recover(lock)
+            self._results_before = _load_results(self.results)
             seen, skips = find_settled_logs(self.logs, settle, before.logs if before else {})
             try:
                 failure = self._run_snakemake(cores, skips, lock)
@@ -269,6 +276,8 @@ class Night:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = make_state(tables, finished, logs, since)
             changes = compare_states(before, after, tables, late)
+            if names := {each.recording for each in changes.changed if not each.new_log}:
+                changes.reanalysis += self._compare_results(names)
             files = describe_drop_zone(self.results)
             analysed = after.recordings
             after = after.without(late, before)
@@ -294,6 +303,16 @@ class Night:
         )
         return summary, after
 
+    def _compare_results(self, names: Collection[str]) -> list[str]:
+        """Return how the results of recordings differ from the results before this run."""
+        runs = (self._results_before, _load_results(self.results))
+        old, new = (
+            {key: run[key] for key in run if f"{key.sensor}/{key.recording}" in names}
+            for run in runs
+        )
+        found = list_differences(old, new)
+        return [line for line in describe_differences(found, "practical") if line and found]
+
     def _describe_disk_space(self) -> list[str]:
         free = disk_usage(self.results).free
         if free >= _LOW_DISK_SPACE:
@@ -311,6 +330,14 @@ class Night:
         if after is not None:
             after.write(self._state)
             seal_files(self.results, name_night_place("state"), [self._state], {})
+
+
+def _load_results(results: Path) -> Results:
+    """Return the results of a run to compare; empty if there are none that can be read."""
+    try:
+        return load_results(results)
+    except (OSError, ValueError):
+        return {}
 
 
 @contextmanager

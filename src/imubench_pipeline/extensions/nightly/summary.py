@@ -21,6 +21,7 @@ from imubench_pipeline.report.run_summary import (
     list_failures,
     select_warnings,
 )
+from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
 from imubench_pipeline.words.numbers import Unit
@@ -79,6 +80,7 @@ class State(BaseModel):
     drifted: list[Drifted] = []
     leaders: dict[str, Leader | None] = {}  # by requirement
     skipped: dict[str, datetime] = {}  # since when, without a break
+    software: dict[str, str] = {}  # version, and digest of the settings
 
     def write(self, path: Path) -> None:
         """Write the state atomically."""
@@ -124,6 +126,7 @@ class RunRows:
     findings: list[FindingRow]
     drift: list[DriftRow]
     ranking: list[RankingRow]
+    software: Mapping[str, str]
 
 
 def load_tables(results: Path) -> RunRows:
@@ -140,6 +143,7 @@ def load_tables(results: Path) -> RunRows:
         findings=rows(FindingRow),
         drift=rows(DriftRow),
         ranking=rows(RankingRow),
+        software=read_software(results),
     )
 
 
@@ -173,6 +177,7 @@ def make_state(
         drifted=sorted(make_drift_keys(tables.drift)),
         leaders=find_leaders(tables.ranking),
         skipped=dict(skipped),
+        software=dict(tables.software),
     )
 
 
@@ -221,6 +226,7 @@ class Changed(BaseModel):
 
     recording: str
     because: str
+    new_log: bool
 
 
 class Skipped(BaseModel):
@@ -272,6 +278,7 @@ class Drift(BaseModel):
     expected_upper: float | None
     unit: str
     reasons: tuple[str, ...]
+    reanalysed: bool = False  # with the same log, so its value may have changed by the analysis
 
 
 class First(BaseModel):
@@ -296,6 +303,7 @@ class Changes(BaseModel):
     rejected: list[Rejected] = []
     warnings: list[NewWarning] = []
     drift: list[Drift] = []
+    reanalysis: list[str] = []  # effect of another version, code or settings on the same logs
     first: list[First] = []
 
 
@@ -353,8 +361,14 @@ def compare_states(
         for row in select_warnings(tables.findings)
         if get_recording_name(row) not in written_to and make_warning_key(row) not in known_warnings
     ]
+    changed = [
+        name
+        for name in now
+        if name in was.recordings and now[name].digest != was.recordings[name].digest
+    ]
+    reanalysed = {name for name in changed if was.logs.get(name) == after.logs.get(name)}
     drift = [
-        Drift.model_validate(row, from_attributes=True)
+        Drift.model_validate(row.columns() | {"reanalysed": get_recording_name(row) in reanalysed})
         for key, row in make_drift_keys(tables.drift).items()
         if key.name not in written_to and key not in known_drift
     ]
@@ -367,12 +381,12 @@ def compare_states(
         changed=[
             Changed(
                 recording=name,
-                because="its log changed"
-                if was.logs.get(name) != after.logs.get(name)
-                else "settings, or the code of the analysis, changed",
+                because=_explain_reanalysis(was.software, after.software)
+                if name in reanalysed
+                else "its log changed",
+                new_log=name not in reanalysed,
             )
-            for name in now
-            if name in was.recordings and now[name].digest != was.recordings[name].digest
+            for name in changed
         ],
         removed=[name for name in was.recordings if name not in after.recordings],
         failed=failed,
@@ -381,6 +395,16 @@ def compare_states(
         drift=drift,
         first=first,
     )
+
+
+def _explain_reanalysis(was: Mapping[str, str], now: Mapping[str, str]) -> str:
+    """Return why a recording was analysed again although its log is the same."""
+    old, new = (software.get("version", "") for software in (was, now))
+    if old and old != new:
+        return f"the program changed from version {old} to {new}"
+    if was and was["settings"] != now.get("settings"):
+        return "settings changed"
+    return "settings, or the code of the analysis, changed"
 
 
 def format_summary(summary: Summary) -> str:
@@ -411,6 +435,7 @@ def format_summary(summary: Summary) -> str:
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
+        "changed by the analysis, with the same logs": summary.reanalysis,
         "removed": summary.removed,
         "skipped, and checked again next time": [
             f"{skip.recording}: {skip.reason}{'; its results stay' * skip.keeps_results} "
@@ -449,7 +474,9 @@ def _describe_drift(drift: Drift) -> str:
     expected = f", expected {limits}" if low is not None and high is not None else ""
     return (
         f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
-        f"{drift.recording}{expected}" + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)
+        f"{drift.recording}{expected}"
+        + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)
+        + "; analysed again with the same log: the analysis may be the cause" * drift.reanalysed
     )
 
 
