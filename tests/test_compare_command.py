@@ -9,7 +9,8 @@ import pytest
 from imubench_pipeline.model.run_differences import DifferenceKind, Result, ResultKey
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.run.run_differences import KINDS, list_differences
-from imubench_pipeline.tables.files import write
+from imubench_pipeline.steps.tables import describe_tables
+from imubench_pipeline.tables.files import write, write_json
 from tests.test_show import PARAMETERS, RANKING, parameter, recording, standing
 
 N = 1.0e-5
@@ -180,10 +181,23 @@ def test_a_run_of_another_version_is_compared(
     assert "Values changed beyond" in compare(capsys, before, after)
     pq.write_table(table.drop_columns(["status"]), path)
     assert main(["compare", str(before), str(after)]) == 2
-    assert "has no column status; expected the table parameters" in capsys.readouterr().err
+    assert "it has no status" in capsys.readouterr().err
+
+
+def test_the_software_of_the_runs_is_named(
+    before: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    after = put(tmp_path / "after")
+    for path, version in ((before, "1.0"), (after, "1.1")):
+        package = describe_tables({"version": version, "settings": "0123"})
+        write_json(package, path / "tables/datapackage.json")
+    lines = compare(capsys, before, after).splitlines()
+    assert lines[:2] == ["A: imubench 1.0, settings 0123", "B: imubench 1.1, settings 0123"]
+    (after / "tables/datapackage.json").write_text("{}")  # of nobody: nothing is said
+    assert compare(capsys, before, after).splitlines()[1].startswith("Recordings")
 
 
 def test_missing_results_are_named(before: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.rmtree(before / "tables")
     assert main(["compare", str(before), str(before)]) == 2
-    assert "no table recordings, parameters, ranking, findings" in capsys.readouterr().err
+    assert "no table parameters, ranking, findings, recordings" in capsys.readouterr().err

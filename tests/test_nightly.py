@@ -29,6 +29,7 @@ from imubench_pipeline.extensions.nightly.summary import (
     StateError,
     Summary,
     compare_states,
+    describe_reanalysis,
     format_summary,
     load_tables,
     make_state,
@@ -37,8 +38,9 @@ from imubench_pipeline.extensions.nightly.summary import (
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.run_differences import load_results
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables.files import replace_file, write
+from imubench_pipeline.tables.files import replace_file, write, write_json
 from tests.test_configuration import SENSOR
 
 NOW = datetime(2026, 10, 20, 1, 30, tzinfo=UTC)
@@ -500,6 +502,42 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
     assert "robot: No sensor meets the limits. u is closest, but fails." in text
     assert " (before: s)\n" in text
+
+
+def test_another_version_is_told_from_another_sensor(tmp_path: Path) -> None:
+    def noise(value: float) -> list[dict[str, Any]]:
+        row = {"sensor": "s", "recording": "a", "channel": "gyro_x", "method": "robust",
+               "recommended": True, "model": "N", "component": 1, "parameter": "N",
+               "unit": "rad/s/sqrt(Hz)", "status": "ok", "value": value, "lower": 0.9 * value,
+               "upper": 1.1 * value}  # fmt: skip
+        return [row, row | {"recording": "b"}]
+
+    def night(version: str, value: float, verdict: str | None, log: int) -> tuple[State, Any, Any]:
+        write_json(
+            {"software": {"version": version, "settings": "0"}},
+            tmp_path / "tables/datapackage.json",
+        )
+        rows = {"recordings": [recording("a"), recording("b")], "parameters": noise(value),
+                "drift": [drift("a", verdict), drift("b", verdict)]}  # fmt: skip
+        return *state(tmp_path, {"a": 1, "b": log}, **rows), load_results(tmp_path)
+
+    before, _, old = night("1.0", 1e-4, None, 1)
+    after, tables, new = night("1.1", 2e-4, "changed", 2)
+    changes = compare_states(before, after, tables, [])
+    reasons = {each.recording: (each.because, each.new_log) for each in changes.changed}
+    assert reasons == {
+        "s/a": ("the program changed from version 1.0 to 1.1", False),
+        "s/b": ("its log changed", True),
+    }
+    assert [(each.recording, each.reanalysed) for each in changes.drift] == [
+        ("a", True), ("b", False)
+    ]  # fmt: skip
+    changes.reanalysis += describe_reanalysis(old, new, {"s/a"})
+    text = format_summary(summary(changes))
+    assert "changed by the analysis, with the same logs:\n" in text
+    assert "Values changed beyond their intervals: 1, by a factor of up to 2\n" in text
+    assert "s/a gyro_x N: 0.34 °/√h (0.31 to 0.38), now 0.69 °/√h (0.62 to 0.76) (2 times)" in text
+    assert text.count("the analysis may be the cause") == 1
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ DifferenceKind = Literal[
 class ResultKey:
     """Identify a result in a run."""
 
-    table: Literal["recordings", "parameters", "ranking", "findings"]
+    table: str
     sensor: str
     recording: str | None = None
     channel: str | None = None

@@ -15,7 +15,7 @@ from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.datapackage import read_software
-from imubench_pipeline.tables.files import find_tables, read_any_version
+from imubench_pipeline.tables.files import find_tables, read_part
 from imubench_pipeline.words.numbers import Unit
 from imubench_pipeline.words.run_differences import count_text, difference_text
 
@@ -26,6 +26,13 @@ KINDS: tuple[DifferenceKind, ...] = get_args(DifferenceKind)
 _VERDICTS = (*get_args(Verdict), None)  # the best first; None: no verdict
 _NOT_ANALYSED = ("failed", "rejected")
 _STATES = ("fit", "fit with doubts", "unfit", *_NOT_ANALYSED)  # of a recording, the best first
+_NAMES = {
+    "parameters": ("parameter", "status"),
+    "ranking": ("requirement", "verdict"),
+    "findings": ("finding", "severity"),
+}
+"""Columns with the name and the state of a result."""
+
 _LAST_USED = 1  # index in it
 _WORST = 3  # differences that are described without `every`
 _LONGEST = 400  # characters of one
@@ -39,27 +46,23 @@ def load_results(results: Path) -> Results:
     The run may be of another version. Raises a `tables.files.TableError` if a table is missing or
     cannot be read.
     """
-    paths = find_tables(results, ("recordings", "parameters", "ranking", "findings"))
-    rows = {name: read_any_version(name, path).to_pylist() for name, path in paths.items()}
     found: dict[ResultKey, Result] = {}
-    for row in rows["recordings"]:
-        state = row["status"] if row["status"] != "ok" else row["fitness"] or "fit"
-        key = ResultKey("recordings", row["sensor"], row["recording"])
-        found[key] = Result(state, detail=row["reason"])
-    for row in rows["parameters"]:
-        if row["recommended"]:
-            place = [
-                row[name] for name in ("sensor", "recording", "channel", "parameter", "component")
-            ]
-            values = [row[name] for name in ("status", "value", "lower", "upper", "unit")]
-            found[ResultKey("parameters", *place)] = Result(*values)
-    for row in rows["ranking"]:
-        if row["decides"]:
-            key = ResultKey("ranking", row["sensor"], name=row["requirement"])
-            found[key] = Result(row["verdict"])
-    for row in rows["findings"]:
-        place = [row[name] for name in ("sensor", "recording", "channel", "finding")]
-        found[ResultKey("findings", *place)] = Result(row["severity"], detail=row["detail"])
+    for table, path in find_tables(results, (*_NAMES, "recordings")).items():
+        for row in read_part(table, path, any_version=True).to_pylist():
+            if table == "recordings":
+                state = row["status"] if row["status"] != "ok" else row["fitness"] or "fit"
+                found[ResultKey(table, row["sensor"], row["recording"])] = Result(
+                    state, detail=row["reason"]
+                )
+            elif row.get("recommended", row.get("decides", True)):
+                name, state = _NAMES[table]
+                of = None if table == "ranking" else row["recording"]
+                key = ResultKey(
+                    table, row["sensor"], of, row.get("channel"), row[name], row.get("component")
+                )
+                columns = ("value", "lower", "upper", "unit") if table == "parameters" else ()
+                values = {column: row[column] for column in columns}
+                found[key] = Result(row[state], **values, detail=row.get("detail"))
     return found
 
 

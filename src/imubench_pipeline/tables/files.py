@@ -212,12 +212,36 @@ def join_tables(table: str, parts: Sequence[pa.Table]) -> pa.Table:
     return pa.concat_tables(plain).cast(expected)
 
 
-def read_part(table: str, path: Path) -> pa.Table:
+def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
     """Read one file of a table, with its metadata.
 
-    Raises a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
+    Of ``any_version``, missing columns that may be null are null, and unknown ones left out. Raises
+    a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
-    part, expected = _load_part(path), make_schema(table)
+    expected = make_schema(table)
+    try:
+        if path.exists() and not path.is_file():  # a pipe never answers
+            raise pa.ArrowInvalid("it is no file")
+        if is_seal_broken(path):
+            raise pa.ArrowInvalid("its metadata were changed")
+        with open_parquet(path) as file:
+            part = file.read(use_threads=False)
+        metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
+        part = part.replace_schema_metadata(metadata)
+    except FileNotFoundError:
+        raise
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+        raise TableError(
+            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
+        ) from error
+    if any_version:
+        for field in expected:
+            if field.name not in part.column_names and (
+                field.nullable or pa.types.is_list(field.type)
+            ):
+                part = part.append_column(field, pa.nulls(len(part), field.type))
+        known = [name for name in expected.names if name in part.column_names]
+        part = part.select(known)
     if other := _other_columns(part.schema, expected):
         raise TableError(
             f"{path}: was made by another version of imubench_pipeline: {other}; run snakemake -c2 "
@@ -231,47 +255,6 @@ def read_part(table: str, path: Path) -> pa.Table:
     if part.schema.equals(expected):
         return part
     return part.cast(expected).replace_schema_metadata(part.schema.metadata)
-
-
-def read_any_version(table: str, path: Path) -> pa.Table:
-    """Read one file of a table that another version may have written.
-
-    Columns that are not known here are left out; missing ones that may be null are null. Raises a
-    `TableError` if the file is damaged, or lacks a required column.
-    """
-    part = _load_part(path)
-    columns = []
-    for field in make_schema(table):
-        if field.name in part.column_names:
-            try:
-                columns.append(part[field.name].cast(field.type))
-            except pa.ArrowException as error:
-                raise TableError(f"{path}: column {field.name}: {error}") from error
-        elif field.nullable or pa.types.is_list(field.type):
-            columns.append(pa.nulls(len(part), field.type))
-        else:
-            raise TableError(
-                f"{path}: has no column {field.name}; expected the table {table} of a run"
-            )
-    return pa.Table.from_arrays(columns, schema=make_schema(table))
-
-
-def _load_part(path: Path) -> pa.Table:
-    try:
-        if path.exists() and not path.is_file():  # a pipe never answers
-            raise pa.ArrowInvalid("it is no file")
-        if is_seal_broken(path):
-            raise pa.ArrowInvalid("its metadata were changed")
-        with open_parquet(path) as file:
-            part = file.read(use_threads=False)
-        metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
-        return part.replace_schema_metadata(metadata)
-    except FileNotFoundError:
-        raise
-    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
-        raise TableError(
-            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
-        ) from error
 
 
 def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import termios
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,6 +32,7 @@ from imubench_pipeline.extensions.nightly.summary import (
     StateError,
     Summary,
     compare_states,
+    describe_reanalysis,
     format_summary,
     load_tables,
     make_state,
@@ -43,12 +44,7 @@ from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import end_group
-from imubench_pipeline.run.run_differences import (
-    Results,
-    describe_differences,
-    list_differences,
-    load_results,
-)
+from imubench_pipeline.run.run_differences import Results, load_results
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import write_content, write_json
@@ -277,7 +273,8 @@ class Night:
             after = make_state(tables, finished, logs, since)
             changes = compare_states(before, after, tables, late)
             if names := {each.recording for each in changes.changed if not each.new_log}:
-                changes.reanalysis += self._compare_results(names)
+                results = (self._results_before, _load_results(self.results))
+                changes.reanalysis += describe_reanalysis(*results, names)
             files = describe_drop_zone(self.results)
             analysed = after.recordings
             after = after.without(late, before)
@@ -302,16 +299,6 @@ class Night:
             **dict(changes),
         )
         return summary, after
-
-    def _compare_results(self, names: Collection[str]) -> list[str]:
-        """Return how the results of recordings differ from the results before this run."""
-        runs = (self._results_before, _load_results(self.results))
-        old, new = (
-            {key: run[key] for key in run if f"{key.sensor}/{key.recording}" in names}
-            for run in runs
-        )
-        found = list_differences(old, new)
-        return [line for line in describe_differences(found, "practical") if line and found]
 
     def _describe_disk_space(self) -> list[str]:
         free = disk_usage(self.results).free

@@ -21,6 +21,11 @@ from imubench_pipeline.report.run_summary import (
     list_failures,
     select_warnings,
 )
+from imubench_pipeline.run.run_differences import (
+    Results,
+    describe_differences,
+    list_differences,
+)
 from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
@@ -405,6 +410,15 @@ def _explain_reanalysis(was: Mapping[str, str], now: Mapping[str, str]) -> str:
     if was and was["settings"] != now.get("settings"):
         return "settings changed"
     return "settings, or the code of the analysis, changed"
+
+
+def describe_reanalysis(old: Results, new: Results, names: Collection[str]) -> list[str]:
+    """Return how the results of recordings that were analysed again differ, in lines."""
+    before, after = (
+        {key: run[key] for key in run if f"{key.sensor}/{key.recording}" in names}
+        for run in (old, new)
+    )
+    return [*filter(None, describe_differences(list_differences(before, after), "practical"))]
 
 
 def format_summary(summary: Summary) -> str:
