@@ -161,7 +161,7 @@ def test_the_next_run_puts_it_right_and_skips_what_grows(project: Project) -> No
     os.close(master)
     assert status == 0, said + b"".join(drawn).decode()
     found = project.summary()
-    assert "was not completed" in found["put_right"][0]
+    assert "did not reach its end" in found["put_right"][0]
     assert any("temporary files removed: 1 " in line for line in found["put_right"])
     assert not list(project.folder.glob("results/**/.*.part"))
     assert not list(project.folder.glob(".snakemake/locks/*"))
