@@ -40,6 +40,7 @@ onstart:
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
     from imubench_pipeline.report.run_summary import (
+        SUMMARISED_TABLES,
         summarise_run,
         list_failed_pages,
     )
@@ -47,7 +48,10 @@ onsuccess:
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     remove_samples()
-    logger.info(summarise_run(plan.run.results), extra=OURS)
+    if bucket:
+        read = [f"tables/{name}.parquet" for name in (*SUMMARISED_TABLES, "files")]
+        bucket.fetch("report/index.html", *read)
+    logger.info(summarise_run(plan.run.results, plan.run.logs), extra=OURS)
     incomplete = [plan.faults.left_out(), list_failed_pages(plan.run.results)]
     if any(incomplete):
         raise WorkflowError("\n".join(filter(None, incomplete)))

@@ -70,6 +70,9 @@ ELSEWHERE = {
     "-e '.[cluster]'": INSTALLS,
     ".venv/bin/snakemake --workflow-profile profiles/slurm --config logs=/data/logs "
     "results=/data/results": "needs Slurm: tests/slurm",
+    ".venv/bin/pip install -e '.[storage]'": INSTALLS,
+    ".venv/bin/snakemake -c16 --workflow-profile profiles/s3 "
+    "--default-storage-prefix s3://lab/imubench": "needs a bucket: tests/storage",
     ".venv/bin/imubench nightly -- --workflow-profile profiles/slurm": "needs Slurm: tests/slurm",
     "pip wheel --no-deps -w dist .": "asks an index for what builds it: "
     "tests/workflow/test_deployed.py builds it without",

@@ -93,7 +93,7 @@ class Project:
                 f"results={self.results}", "simulated=false", *FEW, *self.settings]  # fmt: skip
 
     def run(
-        self, *flags: str, cores: int = 2, lock: Lock | None = None
+        self, *flags: str, cores: int = 2, lock: Lock | None = None, time_limit: float = 600
     ) -> subprocess.CompletedProcess[str]:
         """Run Snakemake, which inherits a lock on the results if one is given."""
         if flags == ("-n",) and self.environment is None:
@@ -107,7 +107,7 @@ class Project:
             capture_output=True,
             text=True,
             check=False,
-            timeout=600,
+            timeout=time_limit,
         )
 
     def jobs(self) -> dict[str, int]:

@@ -29,11 +29,15 @@ from imubench_pipeline.run.sealing import (
     find_unsound_jobs,
     limit_wildcards,
 )
-from imubench_pipeline.settings.config import read_config
+from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import locate_table
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
 from imubench_pipeline.tables.seals import name_place
+
+
+include: "bucket.smk"  # logs and results in an object store
+
 
 # The graph of a thousand recordings is millions of objects, which live as long as the run: to look
 # for garbage among them as often as Python does, and at the end, takes a fourth of the time.
@@ -65,7 +69,15 @@ try:
         for file in given.configfiles:
             update_config(config, read_config(file))
         update_config(config, given.config)
-    plan = Plan(config)
+    provider = workflow.storage_registry.default_storage_provider
+    bucket = None
+    places = {}
+    if provider is not None:
+        prefix = workflow.storage_settings.default_storage_prefix
+        bucket = Bucket(provider, prefix, read_run(config))
+        bucket.list_logs()
+        places = {"logs": str(bucket.logs), "results": str(bucket.results)}
+    plan = Plan({**config, **places}, stored=bucket is not None)
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
@@ -73,8 +85,13 @@ for reason in plan.unusable.values():
     logger.warning(str(reason))
 
 # What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
-# This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
-script = Scripts(plan.faults, None if workflow.remote_exec else make_step_limits(plan))
+# This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake;
+# records of failures and seals of files need results on a disk.
+script = Scripts(
+    plan.faults,
+    None if workflow.remote_exec or bucket else make_step_limits(plan),
+    sealed=not bucket,
+)
 cost = make_resource_functions(plan)
 
 run_lock = Lock(locate_lock(plan.run.results))
@@ -95,7 +112,7 @@ def say_if_idle():
     )
     if is_run and not len(workflow.dag):
         remove_samples()
-        for line in describe_drop_zone(plan.run.results):
+        for line in describe_drop_zone(plan.run.results, plan.run.logs):
             print(line, file=sys.stderr)
 
 
@@ -109,7 +126,7 @@ if not {
 atexit.register(run_lock.release)
 atexit.register(say_if_idle)
 
-RESULTS = str(plan.run.results)
+RESULTS = str(bucket.find_places([plan.run.results])[0] if bucket else plan.run.results)
 KEPT = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = RESULTS + "/sensors/{sensor}"
 LOGS = RESULTS + "/logs"
@@ -177,7 +194,31 @@ def as_files(*tables):
 
 def tried(step):
     """How often a step was tried. One that has this fails for its recording or sensor alone."""
-    return lambda w: plan.attempt(step, w.sensor, w.get("recording"))
+    return lambda w: (0 if bucket else plan.attempt(step, w.sensor, w.get("recording")))
+
+
+def log_of(sensor, recording):
+    """The files of a log that decide by their dates whether it is read again."""
+    found = plan.recordings[sensor, recording]
+    return bucket.find_places(found.files) if bucket else found.inputs
+
+
+def source_of(sensor, recording):
+    """The file or folder of a log, or its copy."""
+    path = plan.recordings[sensor, recording].path
+    return str(bucket.find_copy(bucket.find_places([path])[0]) if bucket else path)
+
+
+# On a disk the samples lie beside `quality.json`, and no rule declares them: only the log tells which
+# files there are. An object store has a folder of them.
+SAMPLES_OUTPUT = {}
+if bucket:
+    SAMPLES_OUTPUT = {
+        "metadata": KEPT + "/samples.json",
+        "samples": directory(KEPT + "/samples"),
+    }
+SAMPLES_INPUT = {"samples": KEPT + "/samples"} if bucket else {}
+SAMPLES_AT_REST = {"samples": at_rest("samples")} if bucket else {}
 
 
 ADDED_TABLES = {}
@@ -247,6 +288,8 @@ def made_again(wildcards):
     It does so by itself for what is missing and needed by a step that runs, and not for what is
     another file, or is damaged.
     """
+    if bucket:
+        return []
     every, own = jobs(), own_rules()
     held_back = {
         name_place("ingest", *key)

@@ -19,8 +19,9 @@ rule simulate:
 
 rule ingest:
     input:
-        log=lambda w: plan.recordings[w.sensor, w.recording].inputs,
+        log=lambda w: log_of(w.sensor, w.recording),
     output:
+        **SAMPLES_OUTPUT,
         quality=KEPT + "/quality.json",
         envelope=KEPT + "/envelope.parquet",
         histogram=KEPT + "/histogram.parquet",
@@ -31,7 +32,7 @@ rule ingest:
     resources:
         **cost(Cost(memory=400, time=1, time_of_values=0.15)),
     params:
-        source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
+        source=lambda w: source_of(w.sensor, w.recording),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
         code=plan.code("ingest"),
         attempt=tried("ingest"),
@@ -43,6 +44,7 @@ rule ingest:
 # step writes, by the spectrum that it fits.
 rule allan:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
     output:
         curve=KEPT + "/curve.parquet",
@@ -62,6 +64,7 @@ rule allan:
 
 rule estimate:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
         curve=KEPT + "/curve.parquet",
     output:
@@ -156,6 +159,7 @@ rule datasheet:
 
 rule error_budget:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
         parameters=KEPT + "/parameters.parquet",
         draws=KEPT + "/draws.parquet",

@@ -6,6 +6,7 @@ rule report:
         tables=[table(name) for name in TABLES if name not in OF_ONE_RECORDING],
         quality=every("quality.json"),
         samples=[file for name in SAMPLES for file in every(f"{name}.parquet")],
+        metadata=every("samples.json") if bucket else [],
         of_models=of_each(plan.on_boards, "samples_of_models"),
         compared=[
             file
@@ -25,5 +26,6 @@ rule report:
         settings=plan.report_settings(),
         code=plan.code("report"),
         pages_attempt=count_attempt(plan.run.results / "report"),
+        one_file=bucket is not None,  # no rule declares each page
     script:
         "../scripts/report.py"

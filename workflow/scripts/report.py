@@ -10,4 +10,5 @@ if __name__ == "__main__":
         snakemake.params.settings,
         Path(snakemake.output.page),
         snakemake.threads,
+        one_file=snakemake.params.get("one_file", False),
     )

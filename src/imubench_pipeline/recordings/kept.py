@@ -19,6 +19,7 @@ from imubench_pipeline.recordings.recording import (
     ChannelLog,
     SampleCounts,
     list_log_files,
+    locate_samples,
     open_channel_logs,
     read_metadata,
     remove_samples,
@@ -93,7 +94,7 @@ class Quality:
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
         """Return the fault of the samples in a folder, or None; all is read only with ``whole``."""
         for name, stated in (self.kept or {}).items():
-            path = folder / name
+            path = locate_samples(folder) / name
             try:
                 if path.stat().st_size != stated.size:
                     if stated.is_removed(path):

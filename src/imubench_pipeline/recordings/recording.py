@@ -27,6 +27,8 @@ from imubench_pipeline.tables.parquet import open_parquet, read_row_group, write
 from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20  # rows of a row group
+SAMPLES_FOLDER = "samples"  # in an object store
+METADATA_FILE = "samples.json"  # there, the metadata of the first file of samples, or null
 MEND = "remove it, and the next run reads the log again"
 BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})  # columns that are no channels
 _NOT_CHANNELS = BESIDE | {"time", "sample"}
@@ -226,7 +228,9 @@ def average_blocks(blocks: Iterable[Array]) -> float:
 
 
 def read_metadata(path: Path) -> LogMetadata:
-    """Return the metadata that `LogWriter.finish` wrote."""
+    """Return the metadata that `LogWriter.finish` wrote, or of a `METADATA_FILE`."""
+    if path.name == METADATA_FILE:
+        return _METADATA_ADAPTER.validate_json(path.read_bytes())
     metadata = pq.read_metadata(path).metadata or {}
     return _METADATA_ADAPTER.validate_json(metadata[METADATA])
 
@@ -241,7 +245,13 @@ def remove_samples(path: Path, sha256: str) -> None:
 
 def list_log_files(folder: Path) -> list[Path]:
     """Return the Parquet files of an ingested recording, one per time base."""
-    return sorted(folder.glob("log*.parquet"))
+    return sorted(locate_samples(folder).glob("log*.parquet"))
+
+
+def locate_samples(folder: Path) -> Path:
+    """Return the folder of these files: a folder of their own if they were in an object store."""
+    own = folder / SAMPLES_FOLDER
+    return own if own.is_dir() else folder
 
 
 def open_static_logs(folder: Path) -> dict[str, ChannelLog]:

@@ -443,6 +443,9 @@ def describe_recording(
 
 def load_metadata(folder: Path) -> recording.LogMetadata | None:
     """Return the metadata of a log; None without samples, RecordingError if it was altered."""
+    stored = folder / recording.METADATA_FILE
+    if stored.is_file():  # of an object store: the samples are not needed for it
+        return recording.read_metadata(stored) if stored.read_bytes() != b"null" else None
     quality = folder / "quality.json"
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
         raise RecordingError(fault)

@@ -18,7 +18,7 @@ from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import counted, join_names
 from imubench_pipeline.words.verdicts import answer_text
 
-_NEEDED = ("recordings", "findings", "ranking", "failures")
+SUMMARISED_TABLES = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
 _MOST_LETTERS, _MOST_LETTERS_OF_ANSWER = 200, 1000
 
@@ -38,9 +38,12 @@ _DONE = re.compile(r"^Finished jobid: (\d+) ", re.MULTILINE)
 _INTERRUPTED = "Terminating processes on user request"
 
 
-def summarise_run(results: Path) -> str:
-    """Return the summary of a finished run; empty without tables."""
-    paths = {name: locate_table(results, name) for name in _NEEDED}
+def summarise_run(results: Path, logs: Path | None = None) -> str:
+    """Return the summary of a finished run; empty without tables.
+
+    `logs`: as of `describe_drop_zone`.
+    """
+    paths = {name: locate_table(results, name) for name in SUMMARISED_TABLES}
     if not all(path.exists() for path in paths.values()):
         return ""
     try:
@@ -60,7 +63,7 @@ def summarise_run(results: Path) -> str:
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)
-    lines += describe_drop_zone(results)
+    lines += describe_drop_zone(results, logs)
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
         lines += _bounded(f"  {line}" for line in warned)
@@ -185,13 +188,16 @@ def _bounded(lines: Iterable[str]) -> list[str]:
 _MAX_NAMES = 5
 
 
-def describe_drop_zone(results: Path) -> list[str]:
-    """Return the balance of the last run, and the changes in the drop zone since, as lines."""
+def describe_drop_zone(results: Path, logs: Path | None = None) -> list[str]:
+    """Return the balance of the last run, and the changes in the drop zone since, as lines.
+
+    `logs`: the drop zone; None: as the report names it.
+    """
     try:
         files = FileRow.rows_of(read("files", [results / "tables/files.parquet"]))
     except (OSError, ValueError):
         return []  # missing and damaged files are reported elsewhere
-    logs = find_drop_zone(results)
+    logs = logs or find_drop_zone(results)
     if logs is None:
         return [*count_files(files), *(["the drop zone of the run is not known"] if files else [])]
     if logs.is_dir():

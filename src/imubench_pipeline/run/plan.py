@@ -60,10 +60,12 @@ class Plan:
     """The plan of a run.
 
     A ConfigError is raised if the configuration or the list of simulated recordings cannot be used,
-    or a log would make the same recording as one of these.
+    or a log would make the same recording as one of these. ``stored``: the logs are in an object
+    store, and their dates there decide whether they are read again.
     """
 
-    def __init__(self, config: Mapping[str, object]) -> None:
+    def __init__(self, config: Mapping[str, object], *, stored: bool = False) -> None:
+        self._stored = stored
         self.run: Run = read_run(config)
         _check_places(self.run)
         self.faults = Faults(self.run.results)
@@ -205,7 +207,7 @@ class Plan:
                     notes.check_gyro(log)
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
-            files = plan_recording_versions(recording, self.run.results)
+            files = {} if self._stored else plan_recording_versions(recording, self.run.results)
             return plan(log=log, notes=notes, files=files)
         except UnavailableSettingsError as error:
             return plan(unavailable=self._without_folders(str(error)))

@@ -25,11 +25,13 @@ class Scripts:
     A rule with the parameter ``attempt`` belongs to a recording or a sensor, which is left out if
     its script fails. A killed script, for example for lack of memory, is run once more. Any script
     ends the job as usual if it is stopped with the run, the disk is full, or it cannot be imported.
-    Without `limits` (of a step of one recording or sensor) each failure ends the job.
+    Without `limits` (of a step of one recording or sensor) each failure ends the job. Outputs are
+    sealed unless ``sealed`` is False, as in an object store.
     """
 
-    def __init__(self, faults: Faults, limits: Limits | None) -> None:
+    def __init__(self, faults: Faults, limits: Limits | None, *, sealed: bool = True) -> None:
         self._faults = faults
+        self._sealed = sealed
         self._limits = limits
         self._processes = Processes()
 
@@ -45,7 +47,7 @@ class Scripts:
         parts = {
             name: given[name] for name in ("input", "output", "params", "wildcards", "threads")
         }
-        log, results = Path(given["log"][0]), self._faults.results
+        log, results = Path(given["log"][0]), self._faults.results if self._sealed else None
         job = Job(Path(script), **parts, log=log, results=results)
         job.log.unlink(missing_ok=True)
         attempt = job.params.get("attempt")

@@ -2,14 +2,24 @@
 
 from pathlib import Path
 
-from imubench_pipeline.report.publish import make_site, publish
-from imubench_pipeline.tables.files import read
+from imubench_pipeline.report.publish import make_site, publish, render_one_file
+from imubench_pipeline.tables.files import read, write_content
 
 
-def write_report(tables: list[Path], settings: str, start_page: Path, processes: int = 1) -> None:
-    """Write the report; its start page is the last to appear."""
+def write_report(
+    tables: list[Path],
+    settings: str,
+    start_page: Path,
+    processes: int = 1,
+    *,
+    one_file: bool = False,
+) -> None:
+    """Write the report; its start page is the last to appear, or the only one with `one_file`."""
     folder = start_page.parent
     site = make_site(
         {path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent
     )
-    publish(site, folder, processes=processes)
+    if one_file:
+        write_content(render_one_file(site), start_page)
+    else:
+        publish(site, folder, processes=processes)

@@ -13,6 +13,7 @@ rule navigate:
         draws=at_rest("draws.parquet"),
         allan=at_rest("allan.parquet"),
         low_pass=at_rest("low_pass.parquet"),
+        **SAMPLES_AT_REST,
     output:
         navigation=JOINED + "/navigation.parquet",
     log:

@@ -8,6 +8,7 @@ rule calibration:
         quality=KEPT + "/quality.json",
         static_quality=at_rest("quality.json"),
         static_parameters=at_rest("parameters.parquet"),
+        **SAMPLES_INPUT,
     output:
         calibration=KEPT + "/calibration.parquet",
         calibration_points=KEPT + "/calibration_points.parquet",

@@ -28,6 +28,7 @@ rule fusion:
 # Of recordings of boards alone, whose source compares samples by eye.
 rule samples_of_models:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
         parameters=KEPT + "/parameters.parquet",
         low_pass=KEPT + "/low_pass.parquet",
