@@ -194,6 +194,10 @@ def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: R
         )
         at = curve["x"].index(10.0)
         assert curve["y"][at] == pytest.approx(math.degrees(expected), rel=DRAWN)
+    # Of a time at rest for which no errors are stored, the nearest is shown and stated.
+    reader.open(address(NIGHT, SIMULATED, window="45", time="10"))
+    stated = reader.page.locator("form.growth output").first.inner_text()
+    assert stated == "60 s" and "60 s at rest" in caption.inner_text()
 
 
 @pytest.mark.release
