@@ -46,11 +46,28 @@ ABSENT = re.compile(r"(?<![\w.])(?:None|nan|NaN|inf)(?![\w(])")
 """What Python writes where it should be a dash."""
 
 
+NAMED = {"sensor": "one", "recording": "day", "channel": "gyro_x", "requirement": "robot",
+         "error": "attitude", "quantity": "gyro", "statistic": "N", "parameter": "N",
+         "figure": "N", "status": "ok", "severity": "warning", "finding": "step", "code": "step",
+         "fitness": "unfit", "published": "yes"}  # fmt: skip
+"""Values of columns that name something which the report has."""
+
+
 @cache
 def a_row(table: str) -> dict[str, object]:
     """A row of a table that no other fixture has rows of."""
     values = {"string": "gyro_x", "double": 1.5, "float": 1.5, "int64": 1, "bool": True}
-    return {one.name: values[str(one.type)] for one in TABLES[table]}
+    row: dict[str, object] = {}
+    for one in TABLES[table]:
+        named = NAMED.get(one.name)
+        if one.is_list:
+            row[one.name] = ()
+        elif one.values:
+            row[one.name] = named if named in one.values else one.values[0]
+        else:
+            text = str(one.type) == "string"
+            row[one.name] = named if named and text else values[str(one.type)]
+    return row
 
 
 @pytest.fixture(scope="module")
@@ -82,14 +99,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Tables:
         "accuracy": test_papers.PANEL,
         "published": [test_papers.LINE, test_papers.OTHER],
     }  # fmt: skip
-    of_one = {"sensor": "one", "recording": "day", "channel": "gyro_x", "requirement": "robot",
-              "error": "attitude", "quantity": "gyro", "statistic": "N", "parameter": "N",
-              "status": "ok", "severity": "warning", "finding": "step", "verdict": "agree",
-              "code": "step", "fitness": "unfit", "published": "yes"}  # fmt: skip
     for name in JOINED:
         if not (found[name].num_rows or name in made):
-            row = a_row(name)
-            made[name] = [row | {key: value for key, value in of_one.items() if key in row}]
+            made[name] = [a_row(name)]
     return dict(found) | {name: build(name, own) for name, own in made.items()}
 
 

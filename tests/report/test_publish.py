@@ -575,9 +575,9 @@ def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> Non
     publish(made, tmp_path)
     read = sound(tmp_path)
     assert not read["index.html"].naming("not judged", "tr")
-    (line,) = read["index.html"].naming("Not in the table", "p")
+    (line,) = read["index.html"].naming("Not compared", "p")
     assert "board" in line.text and "not sold" in line.text
-    assert "Not ranked: not sold." in read["sensors/board.html"].text
+    assert "this sensor is not sold" in read["sensors/board.html"].text
 
 
 @pytest.mark.release
@@ -652,9 +652,13 @@ def test_a_changed_score_rewrites_its_page_alone(old: Path) -> None:
 @pytest.mark.release
 def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path) -> None:
     after = some()
-    rows = (row for row in after[0]["parameters"] if row["channel"] == "gyro_x")
-    (row,) = (row for row in rows if row["recommended"] and row["parameter"] == "N")
-    row["upper"] *= 1.5
+    rows = after[0]["parameters"]
+    (place,) = (
+        place
+        for place, row in enumerate(rows)
+        if row.recommended and (row.channel, row.parameter) == ("gyro_x", "N")
+    )
+    rows[place] = replace(rows[place], upper=1.5 * rows[place].upper)
     written, seen = republished(old, *after)
     showing = {"sensors/one.html", "index.html", "compare.html"}
     assert written == {"recordings/one/day1.html"} | showing

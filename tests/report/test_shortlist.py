@@ -23,11 +23,11 @@ ROW = {"requirement": "robot", "sensor": "one", "price_class": "consumer", "rank
        "assumed": (HOSTILE,)}  # fmt: skip
 PRINTED = {"requirement": "robot", "basis": "printed"}
 OTHERS: list[dict[str, Any]] = [
-    {"sensor": "weak", "rank": 2, "margin": 0.5, "verdict": "cannot_meet"},
-    {"sensor": "heavy", "margin": 7.0, "verdict": "excluded",
-     "shortfalls": (Shortfall("mass", "", "15 g", (0.02,)),)},
-    {"sensor": "silent", "rank": 3, "margin": 0.4, "verdict": "not_enough_data",
-     "reasons": ["a log decides"]},
+    PRINTED | {"sensor": "weak", "rank": 2, "margin": 0.5, "verdict": "cannot_meet"},
+    PRINTED | {"sensor": "heavy", "margin": 7.0, "verdict": "excluded",
+               "shortfalls": (Shortfall("mass", "", "15 g", (0.02,)),)},
+    PRINTED | {"sensor": "silent", "rank": 3, "margin": 0.4, "verdict": "not_enough_data",
+               "reasons": ["a log decides"]},
 ]  # fmt: skip
 REPEATED = {"sensor": "one", "device": "unit 7", "channel": "gyro_x", "recordings": 3,
             "power_cycled": "unknown", "printed": 4.0, "unit": "deg/h", "kind": "typ",
@@ -38,7 +38,7 @@ REPEATED = {"sensor": "one", "device": "unit 7", "channel": "gyro_x", "recording
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
     tables = joined(recording_rows("one", "day"), requirements={"robot": ROBOT}) | {
-        "shortlist": build("shortlist", [ROW, *({**PRINTED, **row} for row in OTHERS)]),
+        "shortlist": build("shortlist", [ROW, *OTHERS]),
         "repeatability": build("repeatability", [REPEATED]),
     }
     folder: Path = tmp_path_factory.mktemp("report")

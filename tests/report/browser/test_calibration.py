@@ -62,10 +62,10 @@ def test_residuals_have_bars_of_two_sigma_in_the_chosen_unit(read: Open, rows: A
     np.testing.assert_allclose(drawn["y"], [one["residual"] * ARC for one in points], rtol=1e-5)
     bars = [2 * one["sigma"] * ARC for one in points]
     np.testing.assert_allclose(drawn["error_y"]["array"], bars, rtol=1e-5)
-    assert axis_title(figure, "y") == "reading less line (°/h)"
+    assert axis_title(figure, "y") == "residual (°/h)"
     assert axis_title(figure, "x") == "rate of the table (°/s)"
     reader.page.locator("select[data-quantity=gyro]").select_option("SI: rad/s")
-    assert axis_title(figure, "y") == "reading less line (rad/s)"
+    assert axis_title(figure, "y") == "residual (rad/s)"
 
 
 @pytest.mark.release

@@ -147,6 +147,17 @@ def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Repor
 
 
 @pytest.mark.release
+def test_verdicts_are_dark_on_paper_by_night(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, "sensors/alpha.html", scheme="dark")
+    colours = "all => all.map(one => getComputedStyle(one).color)"
+    words = reader.page.locator(".standing h2 b")
+    assert min(map(luminance, words.evaluate_all(colours))) > 0.6
+    reader.page.emulate_media(media="print", color_scheme="dark")
+    assert max(map(luminance, words.evaluate_all(colours))) < 0.4
+    assert not reader.page.locator(".links").is_visible()
+
+
+@pytest.mark.release
 def test_no_figure_is_cut_off_on_paper(read: Open, bench: Report) -> None:
     reader = read(bench.folder, "compare.html", width=718)  # of a sheet of A4 between its margins
     reader.draw_all()

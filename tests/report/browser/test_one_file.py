@@ -18,6 +18,11 @@ def head(page: Page) -> str:
     return page.locator("main h1").inner_text()
 
 
+def turn(page: Page, name: str) -> None:
+    """Turn to a page by the menu."""
+    page.get_by_role("navigation", name="Pages").get_by_role("link", name=name).click()
+
+
 @pytest.mark.release
 @pytest.mark.parametrize("drawn", [False, True])
 def test_one_file_needs_no_other(drawn: bool, read: Open, alone: Path) -> None:
@@ -54,11 +59,17 @@ def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
     assert traces(reader.figure("allan", channel="gyro_x"))
     page.get_by_role("tab", name="Accelerometer x").click()
     expect(page.locator("h2#accel_x")).to_be_in_viewport()
-    page.get_by_role("navigation", name="Pages").get_by_role("link", name="Theory").click()
+    turn(page, "Experiments and method")
+    page.get_by_role("main").get_by_role("link", name="Theory").click()
     expect(page.locator("main h1")).to_contain_text("Theory")
     page.get_by_role("link", name="Densities").click()
     expect(page.locator("#sidedness")).to_be_in_viewport()
-    for expected in (r"#/theory\.html$", r"#channel=accel_x$", r"report\.html$"):
+    for expected in (
+        r"#/theory\.html$",
+        r"#/experiments\.html$",
+        r"#channel=accel_x$",
+        r"report\.html$",
+    ):
         page.go_back()
         expect(page).to_have_url(re.compile(expected))
     expect(page.locator("main h1")).to_have_text(made.TITLE)
@@ -73,8 +84,8 @@ def test_one_file_is_read_where_nothing_is_unfolded(browser: Browser, alone: Pat
     page = browser.new_page()
     page.add_init_script("delete window.DecompressionStream")
     page.goto(alone.as_uri())
-    for name in ("Recordings", "Theory"):
-        page.get_by_role("navigation", name="Pages").get_by_role("link", name=name).click()
+    for name in ("Datasheets", "Experiments and method"):
+        turn(page, name)
         expect(page.locator("main h1")).to_contain_text(name)
         expect(page.get_by_role("alert")).to_contain_text("Firefox 113")
     page.close()
@@ -85,8 +96,9 @@ def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
     reader = read(alone.parent, f"{alone.name}#/theory.html#bias-instability")
     page = reader.page
     expect(page.locator("#bias-instability")).to_be_in_viewport()
+    page.goto(alone.as_uri() + "#/datasheets.html")
     marked = page.locator("header nav a[aria-current]")
-    expect(marked).to_have_text(["Theory"])
+    expect(marked).to_have_text(["Datasheets"])
     page.goto(alone.as_uri() + "#/nothing.html")
     expect(page.locator("main h1")).to_have_text(made.TITLE)
 
@@ -99,8 +111,8 @@ def test_what_is_chosen_stands_behind_the_page(read: Open, alone: Path) -> None:
     assert [one.input_value() for one in chosen.all()] == ["alpha", "beta"]
     chosen.last.select_option("beta/run_2")
     assert page.url.endswith("#/compare.html#a=alpha&b=beta%2Frun_2&axis=gyro_x")
-    page.get_by_role("link", name="Theory").first.click()
-    assert page.url.endswith("#/theory.html")
+    turn(page, "Experiments and method")
+    assert page.url.endswith("#/experiments.html")
     page.go_back()
     page.wait_for_function("document.querySelector('h1').textContent === 'Side by side'")
     assert chosen.last.input_value() == "beta/run_2"

@@ -205,18 +205,20 @@ kinds.forest = (figure) => {
   const marked = new Set(traces.map((trace) => Math.round(trace.y[0])));
   const unmarked = names.map((_, i) => i).filter((i) => !marked.has(i));
   const most = Math.max(1, ...counts.values());
+  const [low, high] = logRange(extent, 0.08);
+  const room = 0.04 * (high - low); // for the markers at both ends
   return {
     traces, groups: [], height: 90 + names.length * Math.min(30 + 8 * (most - 1), 130),
     layout: {
       margin: { l: 10, r: 14, t: 30, b: 45 },
       title: { text: FOREST_NAMES[symbol], font: { size: 14 }, x: 0, xanchor: "left", xref: "container", pad: { l: 8 }, y: 0.98, yanchor: "top" },
-      xaxis: logAxis(`${symbolMarkup(symbol)} (${unit.sign})`, logRange(extent, 0.08)),
+      xaxis: logAxis(`${symbolMarkup(symbol)} (${unit.sign})`, [low - room, high + room]),
       yaxis: {
         ...linearAxis(""), tickvals: names.map((_, i) => i), ticktext: names.map((key) => wrapped(nameOf(key))),
         range: [-0.6, names.length - 0.4], fixedrange: true,
       },
       annotations: unmarked.map((i) => ({
-        xref: "paper", x: 0.01, y: i, xanchor: "left", showarrow: false, text: "not in the model, or not determined", font: { color: inks().soft, size: 12 },
+        xref: "paper", x: 0.01, y: i, xanchor: "left", showarrow: false, text: figure.clientWidth < 560 ? "no value" : "not in the model, or not determined", font: { color: inks().soft, size: 12 },
       })),
     },
   };

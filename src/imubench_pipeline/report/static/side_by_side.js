@@ -192,7 +192,7 @@ kinds.dumbbells = (figure) => {
       yaxis: { ...linearAxis(""), tickvals: words.map((_, i) => i), ticktext: words, range: [-0.6, Math.max(figures.length, 1) - 0.4], fixedrange: true },
       shapes: [{ type: "line", x0: 1, x1: 1, yref: "paper", y0: 0, y1: 1, line: { color: soft, width: 1 } }],
       annotations: figures.flatMap(({ own }, y) => (own[0].value ? [] : [{
-        xref: "paper", x: 0.01, y, xanchor: "left", showarrow: false, text: `${chosen[0].letter} has no value to compare with`, font: { color: soft, size: 12 },
+        xref: "paper", x: 0.01, y, xanchor: "left", showarrow: false, text: `${chosen[0].letter} has no value to compare with`, font: { color: soft, size: 12 }, bgcolor: inks().paper,
       }])),
     },
   };
@@ -225,7 +225,7 @@ function startGrowth(root) {
   const stated = (key, otherwise) => Number(state.get(key)) || otherwise;
   const alone = pageData.recordings.some((row) => row.growth && Object.keys(row.growth.axes).length > 0);
   const of = ["worst", "axis"].includes(state.get("of")) ? state.get("of") : state.has("axis") ? "axis" : "worst";
-  growthOf = { axes: alone ? of : "worst", error: state.get("error") in pageData.errors ? state.get("error") : "heading", window: stated("window", pageData.window), time: stated("time", times.at(-1)) };
+  growthOf = { axes: alone ? of : "worst", error: state.get("error") in pageData.errors ? state.get("error") : "heading", window: windows[place(windows, stated("window", pageData.window))], time: times[place(times, stated("time", times.at(-1)))] };
   const select = element("select", {}, ...Object.keys(pageData.errors).map((error) => new Option(error, error)));
   select.value = growthOf.error;
   const slider = (key, values, text) => {

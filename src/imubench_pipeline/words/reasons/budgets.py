@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.model.states import Status
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import join_names
 
@@ -32,7 +32,7 @@ def channel_not_used(channel: str, reason: str | None) -> str:
 
 
 def parameter_status(symbol: str, channel: str, status: Status) -> str:
-    return f"{symbol} of {channel_name(channel)} is {STATUS_WORDS[status]}"
+    return f"{symbol_text(symbol)} of {channel_name(channel)} is {STATUS_WORDS[status]}"
 
 
 def independent_draws(method: str, channel: str) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from imubench_pipeline.model.states import Status
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import counted, number_text
 
@@ -93,7 +93,7 @@ def tau_beyond(longest: float) -> str:
 
 
 def undetermined(symbol: str, recording: str, channel: str, status: Status) -> str:
-    return f"{symbol} of {recording} {channel_name(channel)} is {STATUS_WORDS[status]}"
+    return f"{symbol_text(symbol)} of {recording} {channel_name(channel)} is {STATUS_WORDS[status]}"
 
 
 def short_for_windows(windows: int, span: float, needed: float, longest: float) -> str:
