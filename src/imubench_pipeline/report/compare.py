@@ -34,6 +34,7 @@ KEPT = ("error_growth", "drawn_deviations")
 _SOURCE_COLUMNS = tuple(field.name for field in fields(ErrorSource))
 _COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
 
+
 def _make_context(site: Site) -> Mapping[str, object]:
     views = _select_recordings(site)
     together = Comparison(site.compared(views), site.names)

@@ -8,12 +8,12 @@ from imubench_pipeline.extensions.aided.plan import (
 
 rule navigate:
     input:
+        **SAMPLES_AT_REST,
         quality=at_rest("quality.json"),
         parameters=at_rest("parameters.parquet"),
         draws=at_rest("draws.parquet"),
         allan=at_rest("allan.parquet"),
         low_pass=at_rest("low_pass.parquet"),
-        **SAMPLES_AT_REST,
     output:
         navigation=JOINED + "/navigation.parquet",
     log:

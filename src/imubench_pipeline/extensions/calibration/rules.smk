@@ -5,10 +5,10 @@ CALIBRATED = plan.of_experiment("rate_table", "positions", "pointing")
 
 rule calibration:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
         static_quality=at_rest("quality.json"),
         static_parameters=at_rest("parameters.parquet"),
-        **SAMPLES_INPUT,
     output:
         calibration=KEPT + "/calibration.parquet",
         calibration_points=KEPT + "/calibration_points.parquet",

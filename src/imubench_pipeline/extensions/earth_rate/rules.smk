@@ -7,11 +7,11 @@ TURNED = plan.of_experiment("two_position")
 
 rule earth_rotation:
     input:
+        **SAMPLES_INPUT,
         quality=KEPT + "/quality.json",
         static_quality=at_rest("quality.json"),
         static_parameters=at_rest("parameters.parquet"),
         static_draws=at_rest("draws.parquet"),
-        **SAMPLES_INPUT,
     output:
         earth_rate=KEPT + "/earth_rate.parquet",
         earth_rate_series=KEPT + "/earth_rate_series.parquet",
