@@ -316,7 +316,7 @@ def made_again(wildcards):
 def remove_samples():
     """Remove the samples that the settings do not keep, where no job is left to do."""
     keep = plan.run.samples.keep
-    if keep == "all":
+    if keep == "all" or bucket:
         return
     take_lock()
     every = jobs()
