@@ -1,9 +1,11 @@
 """Compute the items of a list in several processes, in order."""
 
-import multiprocessing
 import sys
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from typing import Any, TypeVar
 
 _MIN_ITEMS_PER_PROCESS = 20  # with fewer, starting a process takes longer than it saves
@@ -28,12 +30,15 @@ def compute_in_order(
     with warnings.catch_warnings():
         # Threads of OpenBLAS and Arrow exist, which both provide for copies.
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
-        pool = multiprocessing.get_context("fork").Pool(processes, _receive, (make,))
-    with pool:
-        begun = {place: pool.apply_async(_run, (place,)) for place in first}
-        others = pool.imap(_run, [place for place in range(number) if place not in begun])
-        for place in range(number):
-            yield begun[place].get() if place in begun else next(others)
+        # Unlike a `Pool`, it ends its processes by a message: a signal could leave a lock taken.
+        executor = ProcessPoolExecutor(processes, get_context("fork"), _receive, (make,))
+        begun = {place: executor.submit(_run, place) for place in first}
+        waiting = deque(begun.get(place) or executor.submit(_run, place) for place in range(number))
+    try:
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        executor.shutdown(cancel_futures=True)
 
 
 def _receive(work: Callable[[int], Any]) -> None:
