@@ -113,8 +113,8 @@ def test_a_levelled_tilt_is_the_mean_error_of_the_accelerometer_over_g() -> None
     found = budget("attitude", 10.0, gyro=NOTHING, accel=accel, start=start)
     sigma = {source_text(one.source): one.sigma for one in found.contributions}
     assert sigma == {
-        "initial tilt by accel N": pytest.approx(1e-3 / 5.0 / G),
-        "initial tilt by accel turn-on bias": pytest.approx(0.03 / G),
+        "initial tilt from accel N": pytest.approx(1e-3 / 5.0 / G),
+        "initial tilt from accel turn-on bias": pytest.approx(0.03 / G),
     }
     # It cancels the error that made it: velocity sees the noise in the window, and no bias.
     found = budget("velocity", 10.0, gyro=NOTHING, accel=accel, start=start)

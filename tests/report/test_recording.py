@@ -53,5 +53,8 @@ def test_a_back_test_stands_on_the_pages_of_recording_and_comparison(
                  "contradicts the budget", "in the log, not in the model: warm up drift",
                  "log too short: it needs 6000 s"):  # fmt: skip
         assert text in own.text, text
-    said = "observed / predicted heading of gyro x after 100 s: 2 (expected 0.93 to 1.1): outside"
+    said = (
+        "the observed heading of gyro x after 100 s is 2 of the predicted one "
+        "(expected 0.93 to 1.07): outside"
+    )
     assert said in pages["index.html"].text

@@ -419,7 +419,8 @@ def format_backtest(
 
 def format_range(lower: float | None, upper: float | None) -> str:
     """Return the expected range of a ratio."""
-    return f"{numbers.number_text(lower, 2)} to {numbers.number_text(upper, 2)}"
+    digits = numbers.count_digits(1.0, lower, upper)
+    return f"{numbers.number_text(lower, digits)} to {numbers.number_text(upper, digits)}"
 
 
 def describe_backtest(row: RankingRow) -> str:
@@ -431,8 +432,9 @@ def describe_backtest(row: RankingRow) -> str:
     place = ""
     if lower is not None and upper is not None:
         place = ": inside" if lower <= row.backtest_ratio <= upper else ": outside"
+    digits = numbers.count_digits(row.backtest_ratio, lower, upper)
     return (
-        f"observed / predicted {row.error} of {channel} after {numbers.duration_text(row.time)}: "
-        f"{numbers.number_text(row.backtest_ratio, 3)} (expected "
+        f"the observed {row.error} of {channel} after {numbers.duration_text(row.time)} is "
+        f"{numbers.number_text(row.backtest_ratio, digits)} of the predicted one (expected "
         f"{format_range(lower, upper)}){place}"
     )

@@ -89,7 +89,8 @@ def make_templates(system: System) -> jinja2.Environment:
                 mark = f' <span class="status">{status_text(status)}</span>' if status else ""
                 text = f"{number(value)}{mark}"
             if upper is not None:
-                limits = f"{number(lower)} to" if lower is not None else "below"
+                is_bound = lower is None or (value is None and lower == 0.0)
+                limits = "below" if is_bound else f"{number(lower)} to"
                 text += f"<br><small>{limits} {number(upper)}</small>"
             parts.append(text)
         none = " none" if cell["value"] is None else ""

@@ -266,7 +266,7 @@ def source_text(
     name = f"{sensor}{source_name(source.source)}{size}"
     if source.through in _PATHS:
         return f"{name} {_PATHS[source.through]}"
-    return f"initial tilt by {name}" if source.through == "initial_tilt" else name
+    return f"initial tilt from {name}" if source.through == "initial_tilt" else name
 
 
 _PATHS = {"static_window": "in the static window", "turn": "in the turn"}

@@ -52,8 +52,8 @@ def same(shown: list[float | None], ratio: Ratio, rel: float) -> None:
 
 def words(ratio: Ratio) -> str:
     return {
-        "lower": "A better",
-        "higher": "B better",
+        "lower": "A has less noise",
+        "higher": "B has less noise",
         "not significant": "not significant",
         "not determined": "not determined",
     }[ratio.verdict]
@@ -85,7 +85,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             same(rows[f"adev {tau:g}"]["ratios"][0], ratio, DRAWN)
             assert words(ratio) in rows[f"adev {tau:g}"]["texts"][1]
     # Three times the noise, and no doubt of it.
-    assert "A better" not in reader.page.locator(".answer").inner_text()
+    assert "A has less noise" not in reader.page.locator(".answer").inner_text()
     assert "N (3 times)" in reader.page.locator(".answer").inner_text()
 
 

@@ -146,7 +146,7 @@ function comparedFigures() {
 // Less noise is better.
 function verdictOf(ratio, first, second) {
   const better = { lower: first, higher: second }[ratio.verdict];
-  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "significant" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
+  return better ? { text: `${better.letter} has less noise`, letter: better.letter, kind: "significant" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
 }
 
 function compareChosen(root) {

@@ -21,8 +21,8 @@ MINIMUM_BEYOND = "some models that fit the log have no minimum up to the longest
 
 def changes_between_parts(excess: float) -> str:
     return (
-        f"the limits contain {percent_text(excess, 2)} (one standard deviation) by which parts of "
-        "the log differ beyond the sampling error"
+        f"parts of the log differ by {percent_text(excess, 2)} (1σ) more than by chance, which the "
+        "interval includes"
     )
 
 
