@@ -40,6 +40,11 @@ def evaluate_phi(order: int, z: complex | Array | ComplexArray) -> complex | Com
             near = np.polynomial.polynomial.polyval(np.where(small, z, 0.0), series)
             values = np.where(small, near, values)
         return np.asarray(values, dtype=np.complex128)
+    return _evaluate_scalar_phi(order, z)
+
+
+@lru_cache(maxsize=1 << 12, typed=True)  # an error budget repeats its windows and times
+def _evaluate_scalar_phi(order: int, z: complex) -> complex:
     if abs(z) < _MAX_ARGUMENT_FOR_SERIES:
         term: complex = 1.0 / math.factorial(order)
         total = term
