@@ -55,6 +55,7 @@ def test_parts_have_all_rows_and_any_program_reads_them(folder: Path) -> None:
         for month in ("2026-01", "2026-02", "undated")
     ]
     assert sorted(path.name for path in folder.iterdir()) == names
+    (folder / ".snakemake_timestamp").touch()
     back = read("findings", [find_tables(folder.parents[1], ["findings"])["findings"]])
     assert back.equals(table)
     frame = pd.read_parquet(folder)

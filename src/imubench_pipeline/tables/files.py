@@ -267,7 +267,8 @@ def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
 def _load_part(path: Path) -> pa.Table:
     """Return the rows of a file, or of all files of a folder in order, and its metadata."""
     if path.is_dir():
-        parts = [_load_part(part) for part in sorted(path.iterdir())]
+        # Not a date that Snakemake leaves, in a file whose name begins with a dot.
+        parts = [_load_part(part) for part in sorted(path.glob("[!.]*.parquet"))]
         return pa.concat_tables(parts) if parts else _load_part(path / "empty.parquet")
     try:
         if path.exists() and not path.is_file():  # a pipe never answers
