@@ -184,6 +184,19 @@ def test_a_run_of_another_version_is_compared(
     assert "it has no status" in capsys.readouterr().err
 
 
+def test_a_table_in_parts_is_compared_as_one(
+    before: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    after = put(tmp_path / "after")
+    path = after / "tables/parameters.parquet"
+    path.unlink()
+    for row in TABLES["parameters"][:2]:
+        write("parameters", [row], path / f"{row['sensor']}.parquet")
+    assert compare(capsys, before, after).endswith("No differences\n")
+    (path / "made.parquet").unlink()
+    assert "Values lost: 1 (1 regression)" in compare(capsys, before, after)
+
+
 def test_the_software_of_the_runs_is_named(
     before: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -95,6 +95,7 @@ def describe(tmp_path: Path, **config: object) -> dict[str, str]:
 def test_the_digest_of_the_settings_changes_with_them_and_not_with_places(tmp_path: Path) -> None:
     first = describe(tmp_path)
     assert describe(tmp_path / "elsewhere", results=str(tmp_path / "r")) == first
+    assert describe(tmp_path, tables={"csv": "none"}, samples={"keep": 30}) == first
     other = describe(tmp_path, estimate={"longest": 0.25})
     assert other["settings"] != first["settings"]
     assert other["version"] == first["version"]

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
 from imubench_pipeline.steps.tables import describe_tables
@@ -38,6 +40,19 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(params=["file", "folder"])
+def parted(folder: Path, request: pytest.FixtureRequest) -> Path:
+    """The same, and with parts of the parameters in place of one file."""
+    path = folder / "results/tables/parameters.parquet"
+    if request.param == "folder":
+        table = pq.read_table(path)
+        path.unlink()
+        for sensor in ("imu", "other"):
+            part = table.filter(pc.field("sensor") == sensor)
+            write_arrow(part, path / f"{sensor}.parquet")
+    return folder
+
+
 NOISE = ("sensor", "recording", "channel", "value", "lower", "upper", "unit")
 
 
@@ -57,17 +72,17 @@ def check(folder: Path, noise: Sequence[Any], columns: Sequence[Any]) -> None:
     assert [tuple(row) for row in columns] == meanings
 
 
-def test_duckdb(folder: Path) -> None:
+def test_duckdb(parted: Path) -> None:
     duckdb = pytest.importorskip("duckdb", reason="pip install duckdb; some 20 MB")
     noise, columns = (duckdb.sql(example("sql", number)).fetchall() for number in (0, 1))
-    check(folder, noise, columns)
+    check(parted, noise, columns)
 
 
-def test_polars(folder: Path) -> None:
+def test_polars(parted: Path) -> None:
     pytest.importorskip("polars", reason="pip install polars; some 40 MB")
     found: dict[str, Any] = {}
     exec(example("python"), found)
-    check(folder, found["noise"].rows(), found["columns"].rows())
+    check(parted, found["noise"].rows(), found["columns"].rows())
 
 
 def run(folder: Path, program: str, script: str) -> str:

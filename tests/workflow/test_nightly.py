@@ -227,7 +227,9 @@ def test_logs_that_settled_are_taken_and_what_is_known_flags_nothing_again(
     status, said = project.run()
     assert status == 0, said
     found = project.summary()
-    assert found["changed"] == [{"recording": "one/a", "because": "its log changed"}]
+    assert found["changed"] == [
+        {"recording": "one/a", "because": "its log changed", "new_log": True}
+    ]
     assert [(one["recording"], one["new"]) for one in found["rejected"]] == [("one/c", False)]
     assert found["new"] == ["one/b"] and found["skipped"] == []
     samples = project.samples()

@@ -42,6 +42,7 @@ from imubench_pipeline.tables.seals import compute_digest, name_place
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
+_NOT_IN_RESULTS = ("limits", "report", "samples", "tables")  # settings that change no result
 _RANKING_KEYS = ("price_class", "must")  # keys of a requirement that do not affect the error budget
 
 _REPORTED_SECTIONS = {  # sections of the settings that the report shows
@@ -495,7 +496,7 @@ class Plan:
         ignored = {"logs", "results", "sensors", "requirements", "simulated", "held_back"}
         used = {sensor for sensor, _ in self.recordings} & self.sensors.keys()
         settings = [
-            self.run.model_dump(mode="json", exclude={*ignored, "limits", "report"}),
+            self.run.model_dump(mode="json", exclude={*ignored, *_NOT_IN_RESULTS}),
             {name: self.sensors[name] for name in used},
             self.requirements,
             [*self.simulated.values()],
