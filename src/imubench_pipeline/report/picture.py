@@ -95,8 +95,9 @@ def _draw_curves(
         yield text(x, 36, view.channel.replace("_", " "), f'fill="{colour}" font-weight="bold"')
         x += 150
         few = np.unique(np.linspace(0, len(view.tau) - 1, _LINE_POINTS).astype(int))
-        edges = f"{places(view.tau[few], view.upper[few] * scale)} "
-        edges += places(view.tau[few[::-1]], view.lower[few[::-1]] * scale)
+        limited = few[np.isfinite(view.lower[few]) & np.isfinite(view.upper[few])]
+        edges = f"{places(view.tau[limited], view.upper[limited] * scale)} "
+        edges += places(view.tau[limited[::-1]], view.lower[limited[::-1]] * scale)
         yield f'<polygon points="{edges}" fill="{colour}" opacity=".16"/>'
         dots = places(view.tau, view.adev * scale).replace(" ", "h0M")
         look = f'stroke="{colour}" stroke-width="10" stroke-linecap="round"'
