@@ -49,12 +49,12 @@ def test_a_back_test_stands_on_the_pages_of_recording_and_comparison(
     pages = read_pages(tmp_path)
     own = pages["recordings/imu/day1.html"]
     assert not own.faults
-    for text in ("0.5 °", "0.25 °", "0.93 to 1.1", "712 (410 independent)", "more than predicted",
+    for text in ("0.5 °", "0.25 °", "0.93 to 1.08", "712 (410 independent)", "more than predicted",
                  "contradicts the budget", "in the log, not in the model: warm up drift",
                  "log too short: it needs 6000 s"):  # fmt: skip
         assert text in own.text, text
     said = (
         "the observed heading of gyro x after 100 s is 2 of the predicted one "
-        "(expected 0.93 to 1.07): outside"
+        "(expected 0.93 to 1.08): outside"
     )
     assert said in pages["index.html"].text
