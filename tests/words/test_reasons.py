@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.extensions.calibration import reasons as calibration
 from imubench_pipeline.extensions.exports import reasons as exports
 from imubench_pipeline.words import reasons
 from imubench_pipeline.words.reasons import (
@@ -204,17 +205,17 @@ SIMULATIONS = [
         "typ",
         "why",
     ),
-    of(simulations.printed_noise, "not measured", simulations.of_data_sheet("s", None)),
-    of(simulations.static_noise, "static recording r; method likelihood", "r", "likelihood"),
+    of(calibration.printed_noise, "not measured", simulations.of_data_sheet("s", None)),
+    of(calibration.static_noise, "static recording r; method likelihood", "r", "likelihood"),
     of(
-        simulations.static_noise,
+        calibration.static_noise,
         "of another device, 8, simulated, of its gyro y, as gyro x has",
         *("r", "likelihood"),
         device="8",
         simulated=True,
         channels=("gyro_y", "gyro_x"),
     ),
-    of(simulations.several_segments, "2 segments", 2),
+    of(calibration.several_segments, "2 segments", 2),
     of(simulations.nothing_to_simulate, "no term has a value: a; b", ["a", "b"]),
     of(simulations.no_model_explains, "spectrum of gyro x", "gyro_x"),
 ]
@@ -244,7 +245,7 @@ EXAMPLES = [
 MODULES = [
     import_module(f"{reasons.__name__}.{found.name}")
     for found in pkgutil.iter_modules(reasons.__path__)
-] + [exports]
+] + [calibration, exports]
 CONSTANTS = [
     value
     for module in MODULES

@@ -80,23 +80,3 @@ def kind_of(notes: object) -> Kind:
             if notes.get(key) is not None and not load(block.model).is_static:
                 return key
     return AT_REST
-
-
-def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
-    """Return the gyro of an experiment: the gyro stated in its notes, or the only one.
-
-    `what` completes "the gyro whose axis ..." of the error. Raises ValueError if it is not among
-    the channels of the log, or is not stated and the log has another number of gyros than one; the
-    text begins with the key.
-    """
-    gyros = [name for name in channels if name.startswith("gyro_")]
-    if stated in gyros:
-        return stated
-    in_log = ", ".join(gyros) or "no gyro"
-    if stated is not None:
-        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
-    if len(gyros) != 1:
-        raise ValueError(
-            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
-        )
-    return gyros[0]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
+from imubench_pipeline.extensions.calibration import reasons as texts
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
@@ -19,7 +20,6 @@ from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.words.reasons import simulations as texts
 
 NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
 _DRAW_SEED = 20260101  # each recording and channel has an independent stream

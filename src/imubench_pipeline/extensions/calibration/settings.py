@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from imubench_pipeline.extensions.calibration.pointing import Pointing
-from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
+from imubench_pipeline.settings.experiments import Experiment, Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
@@ -26,6 +26,26 @@ _MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
 
 TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 """The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
+
+
+def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
+    """Return the gyro of an experiment: the gyro stated in its notes, or the only one.
+
+    `what` completes "the gyro whose axis ..." of the error. Raises ValueError if it is not among
+    the channels of the log, or is not stated and the log has another number of gyros than one; the
+    text begins with the key.
+    """
+    gyros = [name for name in channels if name.startswith("gyro_")]
+    if stated in gyros:
+        return stated
+    in_log = ", ".join(gyros) or "no gyro"
+    if stated is not None:
+        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
+    if len(gyros) != 1:
+        raise ValueError(
+            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
+        )
+    return gyros[0]
 
 
 class Direction(Strict):

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
+from imubench_pipeline.extensions.calibration.settings import stated_gyro
+from imubench_pipeline.settings.experiments import Experiment, Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,

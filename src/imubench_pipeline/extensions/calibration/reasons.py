@@ -1,0 +1,47 @@
+"""Sources of the noise of a turned gyro."""
+
+from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.numbers import counted
+
+NO_NOISE_MODEL = (
+    "the noise of this sensor is not known: no static recording is usable, and its data sheet "
+    "prints no noise. Add a static log of this sensor"
+)
+
+
+def printed_noise(source: str) -> str:
+    return (
+        f"typical figures of {source}, not measured. No static recording of this sensor determines "
+        "its noise"
+    )
+
+
+def static_noise(
+    recording: str,
+    method: str,
+    *,
+    device: str | None = None,
+    simulated: bool = False,
+    channels: tuple[str, str] | None = None,
+) -> str:
+    """Return the static recording from which a noise model is.
+
+    ``device``: of the recording if it is another one; ``channels``: the channel that is used, and
+    the channel without an estimate, if they differ.
+    """
+    words = [f"static recording {recording}"]
+    if device is not None:
+        words.append(f"of another device, {device}")
+    if simulated:
+        words.append("simulated")
+    if channels is not None:
+        used, asked = map(channel_name, channels)
+        words.append(f"of its {used}, as {asked} has no estimate there")
+    return f"{', '.join(words)}; method {method}"
+
+
+def several_segments(segments: int) -> str:
+    return (
+        f"the log has {counted(segments, 'segment')}, with gaps of unknown length between them. "
+        "State one of them as 'use:' beside the log"
+    )
