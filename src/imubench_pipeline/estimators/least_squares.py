@@ -21,12 +21,7 @@ from imubench_pipeline.estimators.curve_bias import (
     find_lowest_point,
     make_averaging_times,
 )
-from imubench_pipeline.estimators.estimate import (
-    BROADBAND_TIME,
-    SIGMAS,
-    Estimate,
-    Parameter,
-)
+from imubench_pipeline.estimators.estimate import BROADBAND_TIME, SIGMAS, Estimate, Parameter
 from imubench_pipeline.noise import (
     PEAK_TAU,
     NoiseModel,

@@ -10,11 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 from imubench_pipeline.datasheets.class_limits import find_limit
-from imubench_pipeline.datasheets.printed_noise import (
-    WALK_TIMES,
-    PrintedNoise,
-    read_printed_noise,
-)
+from imubench_pipeline.datasheets.printed_noise import WALK_TIMES, PrintedNoise, read_printed_noise
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import Measured, Verdict

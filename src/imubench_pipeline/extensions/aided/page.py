@@ -155,9 +155,7 @@ def _describe_effect(rows: Sequence[NavigationRow]) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def rank_sensors(
-    rows: Sequence[NavigationRow],
-) -> Iterator[tuple[int, NavigationLine, list[str]]]:
+def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[tuple[int, NavigationLine, list[str]]]:
     """Yield place, line and overlapping sensors by the error after the longest outage."""
     for trajectory in dict.fromkeys(row.trajectory for row in rows):
         chosen = [

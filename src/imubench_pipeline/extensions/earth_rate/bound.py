@@ -16,10 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.calibration.experiment import (
-    Blocks,
-    Experiment,
-)
+from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
 from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array

@@ -17,8 +17,5 @@ EXTENSION = Extension(
     },
     sensor_commands=("exports.targets:list_commands",),
     listings=("exports.targets:list_targets",),
-    commands={
-        "calibrate": "exports.calibrate:COMMAND",
-        "export": "exports.command:COMMAND",
-    },
+    commands={"calibrate": "exports.calibrate:COMMAND", "export": "exports.command:COMMAND"},
 )

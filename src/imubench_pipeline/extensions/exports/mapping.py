@@ -60,12 +60,7 @@ def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
 
 
 def as_process(
-    model: NoiseModel,
-    horizon: float,
-    rate: float,
-    *,
-    walk: bool = False,
-    time: float | None = None,
+    model: NoiseModel, horizon: float, rate: float, *, walk: bool = False, time: float | None = None
 ) -> Mapped:
     """Return white noise and one Gauss-Markov process in place of a model.
 

@@ -8,6 +8,5 @@ from imubench_pipeline.registry import Extension
 _NAMES = ("vectornav", "ubx", "novatel", "ulog", "dataflash", "rosbag")
 
 EXTENSION = Extension(
-    name="formats",
-    formats={name: f"formats.declarations:{name.upper()}" for name in _NAMES},
+    name="formats", formats={name: f"formats.declarations:{name.upper()}" for name in _NAMES}
 )

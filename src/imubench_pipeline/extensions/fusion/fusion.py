@@ -205,11 +205,7 @@ def yield_grades_of_run(
 
 
 def write_fusion(
-    inputs: Mapping[str, str],
-    joint: list[Path],
-    settings: str,
-    catalogue: str,
-    outputs: list[Path],
+    inputs: Mapping[str, str], joint: list[Path], settings: str, catalogue: str, outputs: list[Path]
 ) -> None:
     """Write the tables ``fusion`` and ``grades``, by the stems of ``outputs``, from ``inputs``."""
     how = FusionSettings.model_validate_json(settings)

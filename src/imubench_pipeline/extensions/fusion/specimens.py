@@ -68,9 +68,7 @@ def _scale_model(model: NoiseModel, factors: Array) -> NoiseModel:
 
 
 def simulate_fused_blocks(
-    recording: SimulatedRecording,
-    motion: Mapping[str, Profile],
-    temperature: Profile | None,
+    recording: SimulatedRecording, motion: Mapping[str, Profile], temperature: Profile | None
 ) -> Iterator[dict[str, Array]]:
     """Yield the blocks of a log of fused specimens, SI, and of their temperature, if any, °C."""
     rate = parse_quantity(recording.rate, "frequency")

@@ -2,7 +2,4 @@
 
 from imubench_pipeline.registry import Extension
 
-EXTENSION = Extension(
-    name="nightly",
-    commands={"nightly": "nightly.command:COMMAND"},
-)
+EXTENSION = Extension(name="nightly", commands={"nightly": "nightly.command:COMMAND"})

@@ -19,10 +19,7 @@ from imubench_pipeline.extensions.earth_rate.known_rate import (
     settled,
     track,
 )
-from imubench_pipeline.extensions.earth_rate.published import (
-    PrintedRun,
-    compute_allowed_sigmas,
-)
+from imubench_pipeline.extensions.earth_rate.published import PrintedRun, compute_allowed_sigmas
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
