@@ -10,14 +10,8 @@ import pyarrow as pa
 from imubench_pipeline.datasheets.comparable import SENSITIVITY
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
+from imubench_pipeline.model import estimates
 from imubench_pipeline.model.comparisons import DatasheetRow
-from imubench_pipeline.model.estimates import (
-    AllanRow,
-    FixedBiasRow,
-    ParameterRow,
-    SimulatedTruthRow,
-    TemperatureRow,
-)
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import FLOOR
@@ -36,7 +30,7 @@ _MAX_TAU_OVER_LENGTH = 1.0 / 9.0  # longest tau at which a curve is read, over t
 
 
 def yield_published_figures(
-    truths: str, truth: Iterable[SimulatedTruthRow], tables: Mapping[str, pa.Table]
+    truths: str, truth: Iterable[estimates.SimulatedTruthRow], tables: Mapping[str, pa.Table]
 ) -> Iterator[PublishedFigureRow]:
     """Yield the rows of the table ``published_figures`` of a sensor.
 
@@ -89,7 +83,7 @@ def _place(row: ChannelRow, parameter: str) -> _Place:
 
 def _estimates(
     tables: Mapping[str, pa.Table],
-) -> tuple[dict[_Place, float], dict[_Place, ParameterRow | TemperatureRow]]:
+) -> tuple[dict[_Place, float], dict[_Place, estimates.ParameterRow | estimates.TemperatureRow]]:
     """Return the values from the curve, and the rows of the recommended method."""
     durations = {
         (row.sensor, row.recording): row.duration
@@ -97,26 +91,26 @@ def _estimates(
     }
     # B from the lowest point of each curve, for sources without a visible minimum.
     curve: dict[_Place, float] = {}
-    for point in AllanRow.rows_of(tables["allan"]):
+    for point in estimates.AllanRow.rows_of(tables["allan"]):
         duration = durations.get((point.sensor, point.recording))
         if duration is not None and point.tau <= _MAX_TAU_OVER_LENGTH * duration:
             place = _place(point, "B")
             curve[place] = min(curve.get(place, math.inf), point.adev / FLOOR)
-    parameters = ParameterRow.rows_of(tables["parameters"])
+    parameters = estimates.ParameterRow.rows_of(tables["parameters"])
     for row in parameters:
         if row.method == "curve" and row.component == 1 and row.value is not None:
             curve[_place(row, row.parameter)] = row.value
-    best: dict[_Place, ParameterRow | TemperatureRow] = {}
+    best: dict[_Place, estimates.ParameterRow | estimates.TemperatureRow] = {}
     best.update(_slowest(row for row in parameters if row.recommended))
-    for bias in FixedBiasRow.rows_of(tables["fixed_bias"]):
+    for bias in estimates.FixedBiasRow.rows_of(tables["fixed_bias"]):
         curve[_place(bias, "bias")] = bias.value
-    for thermal in TemperatureRow.rows_of(tables["temperature"]):
+    for thermal in estimates.TemperatureRow.rows_of(tables["temperature"]):
         if thermal.parameter in ("bias", "sensitivity"):
             best[_place(thermal, thermal.parameter)] = thermal
     return curve, best
 
 
-S = TypeVar("S", bound=ParameterRow | SimulatedTruthRow)
+S = TypeVar("S", bound=estimates.ParameterRow | estimates.SimulatedTruthRow)
 
 
 def _slowest(rows: Iterable[S]) -> dict[_Place, S]:

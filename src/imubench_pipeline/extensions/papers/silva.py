@@ -11,14 +11,8 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
+from imubench_pipeline.extensions.earth_rate import known_rate
 from imubench_pipeline.extensions.earth_rate import published as causes
-from imubench_pipeline.extensions.earth_rate.known_rate import (
-    STARTS,
-    as_printed,
-    mean_sigma,
-    settled,
-    track,
-)
 from imubench_pipeline.extensions.earth_rate.published import PrintedRun, compute_allowed_sigmas
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
@@ -53,7 +47,7 @@ _Z_95 = 1.96
 
 def count_covariance_steps(_: Evidence) -> Result:
     """Count the samples after which the covariance of equation 13 as printed overflows."""
-    sigmas = as_printed(PAPER_MODEL, PAPER_RATE, 20, STARTS["degrees"])
+    sigmas = known_rate.as_printed(PAPER_MODEL, PAPER_RATE, 20, known_rate.STARTS["degrees"])
     return Result(fields={"steps": int(np.isfinite(sigmas).sum())})
 
 
@@ -159,13 +153,13 @@ def simulate_settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
     """Return the settling time of each simulated run, s, by the unit of P_0; inf: not settled."""
     design = design_paper_run(PAPER_MINUTES[run])
     model = SensorModel(noise=PAPER_MODEL, bias=_ASSUMED_BIAS)
-    times: dict[str, list[float]] = {name: [] for name in STARTS}
+    times: dict[str, list[float]] = {name: [] for name in known_rate.STARTS}
     for number in range(RUNS):
         rng = channel_rng(1, SENSOR, "gyro_x", f"run {run}, {number}")
         log = simulate_log(model, design, earth_rate=EARTH_RATE, transient=0.0, rng=rng)
-        for name, start in STARTS.items():
-            mean = track(log, design, PAPER_MODEL, EARTH_RATE, start).mean
-            times[name].append(settled(mean, PAPER_RATE, EARTH_RATE))
+        for name, start in known_rate.STARTS.items():
+            mean = known_rate.track(log, design, PAPER_MODEL, EARTH_RATE, start).mean
+            times[name].append(known_rate.settled(mean, PAPER_RATE, EARTH_RATE))
     return {name: tuple(values) for name, values in times.items()}
 
 
@@ -220,8 +214,8 @@ def compute_error_of_mean(_: Evidence) -> Result:
     """Return errors of the Earth's rate, deg/h: of 1000 samples by the start, and of one pair."""
     hour = DEGREE / 3600.0
     along_axis = {
-        name: float(mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
-        for name, start in STARTS.items()
+        name: float(known_rate.mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
+        for name, start in known_rate.STARTS.items()
     }
     pair = compute_allowed_sigmas(PAPER_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL).sigma
     errors = {name: one / math.cos(ASSUMED_LATITUDE) / hour for name, one in along_axis.items()}
