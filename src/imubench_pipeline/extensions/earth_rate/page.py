@@ -495,7 +495,10 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
                 _POSITION_TEXTS[row.positions],
                 row.method,
                 duration_text(row.time),
-                [_format_angle(angle) for angle in (row.roll, row.pitch, row.heading)],
+                [
+                    "not determined" if angle is None else degrees_text(angle, 3)
+                    for angle in (row.roll, row.pitch, row.heading)
+                ],
             )
             for row in rows
             if row.time in _TABLE_TIMES
@@ -527,10 +530,6 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
     if not lent_axes:
         return ""
     return f"The log has no {', '.join(lent_axes)}; the other axes replace them."
-
-
-def _format_angle(value: float | None) -> str:
-    return "not determined" if value is None else degrees_text(value, 3)
 
 
 def _describe_check(rows: Sequence[AlignmentRow]) -> str:

@@ -3,27 +3,22 @@
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from imubench_pipeline.settings.experiments import Experiment, Gyro, stated_gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
+    Rate,
     RateFromZero,
     Strict,
     Text,
+    TimeFromZero,
     make_validator,
 )
 from imubench_pipeline.units import parse_quantity
 
-
-def _from_zero(dimension: str, what: str = "a standard deviation") -> AfterValidator:
-    return make_validator(dimension, f"{what} from 0", from_zero=True)
-
-
-_Rate = Annotated[Text, make_validator("angular_rate")]
-TimeFromZero = Annotated[Text, _from_zero("time", "a time"), Field(examples=["2 s"])]
-
+_DriftFromZero = Annotated[Text, make_validator("gyro_ramp", "a figure from 0", from_zero=True)]
 _REQUIRED_KEYS = {
     "latitude": "the latitude of the place, such as latitude: 45.1 deg (south: negative)",
     "dwell": "the time from one turn to the next, such as dwell: 30 s",
@@ -44,10 +39,10 @@ class TwoPosition(Experiment):
         None, description="direction of the axis in the first dwell; null: not known"
     )
     trust_schedule: bool = Field(False, description="accept the schedule if no turn is detected")
-    turn_on_bias: Annotated[Text, _from_zero("angular_rate")] | None = Field(
+    turn_on_bias: RateFromZero | None = Field(
         None, description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known"
     )
-    drift: Annotated[Text, _from_zero("gyro_ramp")] | None = Field(
+    drift: _DriftFromZero | None = Field(
         None, description="standard deviation of a steady drift, such as 20 deg/h/h; null: none"
     )
     last: tuple[Time, ...] = Field((), description="parts at the end, estimated too: 13 min")
@@ -112,14 +107,14 @@ class PublishedRate(Strict):
     """A published estimate of the Earth's rate."""
 
     where: Text = Field(description="such as section 6")
-    printed: _Rate = Field(description="printed value, with its unit")
+    printed: Rate = Field(description="printed value, with its unit")
     part: Text = Field("whole", description="part part of the run: whole, or such as 'last 13 min'")
 
 
 class SimulatedTurns(TwoPosition):
     """A gyro that is turned between north and south by a schedule."""
 
-    transient: _Rate = Field(
+    transient: Rate = Field(
         "0 deg/s", description="approximate largest rate that is sensed during a turn"
     )
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")

@@ -62,9 +62,12 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
         options.output = outputs.OutputFile(Path(TARGETS[options.target].file_name))
         outputs.check_outputs(options, find_protected_places)
     output: outputs.OutputFile = options.output
+    notes = [
+        log.absolute().with_name(f"{get_recording_name(log.name)}.yaml") for log in options.logs
+    ]
     status = 0
     for topics, path in _list_files(options, output.path):
-        if any(path.absolute() == _locate_notes(log) for log in options.logs):
+        if path.absolute() in notes:
             raise command_line.CommandError(
                 f"{path}: is where the notes of a log are; name another file with --output"
             )
@@ -98,10 +101,6 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
         if (number := used.count(place)) > 1:  # /imu/a and /imu_a
             place = place.with_stem(f"{place.stem}_{number}")
         yield topics, place
-
-
-def _locate_notes(log: Path) -> Path:
-    return log.absolute().with_name(f"{get_recording_name(log.name)}.yaml")
 
 
 def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:

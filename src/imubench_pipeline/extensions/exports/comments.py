@@ -102,11 +102,6 @@ def format_setting(key: str, value: str, comment: str, indent: str = "") -> str:
     return f"{indent}{key}: {value}  # {comment}\n"
 
 
-def format_exponential(value: float) -> str:
-    """Return a number as a float of every YAML reader: with a point and a signed exponent."""
-    return f"{value:.6e}"
-
-
 def format_decimal(value: float) -> str:
     """Return a number without an exponent, and with a point."""
     text = f"{value:.9f}".rstrip("0")

@@ -9,7 +9,7 @@ the authors of the program use or recommend.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
@@ -18,7 +18,6 @@ from imubench_pipeline.extensions.exports.mapping import as_walk
 from imubench_pipeline.extensions.exports.targets import Target
 
 Mode = Literal["bench", "bounded", "in-use"]
-MODES: tuple[Mode, ...] = get_args(Mode)
 
 Densities = Mapping[str, tuple[float, float]]  # N and K of gyro and accel, SI
 
