@@ -50,15 +50,7 @@ def _latitude(text: str) -> str:
 
 
 Time = Annotated[Text, make_validator("time", "a time above zero"), Field(examples=["60 s"])]
-
-
-def _of_outage(text: str) -> str:
-    if not 2.0 <= parse_quantity(text, "time") <= 3600.0:
-        raise ValueError(f"found {text}; expected an outage of 2 s to 1 h")
-    return text
-
-
-Outage = Annotated[Time, AfterValidator(_of_outage)]
+Outage = Annotated[Time, make_validator("time", "an outage of 2 s to 1 h", within=(2.0, 3600.0))]
 """How long there is no GNSS: a few fixes at least."""
 Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
 
@@ -136,21 +128,13 @@ _change = make_validator(
 class TurnOn(Strict):
     """Standard deviations of the biases with which dead reckoning begins."""
 
-    gyro: Text | None = Field(
+    gyro: Annotated[Text, make_validator("angular_rate")] | None = Field(
         None, description="with its unit, such as 0.2 deg/s; null: from the datasheet"
     )
-    accel: Text | None = Field(
+    accel: Annotated[Text, make_validator("acceleration")] | None = Field(
         None, description="with its unit, such as 20 mg; null: from the datasheet"
     )
     on_time: Time = Field("60 s", description="since the sensor was switched on")
-
-    @model_validator(mode="after")
-    def _units(self) -> Self:
-        if self.gyro is not None:
-            parse_quantity(self.gyro, "angular_rate")
-        if self.accel is not None:
-            parse_quantity(self.accel, "acceleration")
-        return self
 
 
 class Environment(Strict):

@@ -60,16 +60,19 @@ def make_validator(
     expected: str | None = None,
     *,
     from_zero: bool = False,
+    within: tuple[float, float] | None = None,
     to_si: Callable[[str, str], float] = parse_quantity,
 ) -> AfterValidator:
     """Return a validator for a number with a unit of a dimension, and its range.
 
     ``expected`` is the expected value in the error for a number that is not above 0 (``from_zero``:
-    not negative); by default all are valid. ``to_si`` converts a text to SI.
+    not negative) or ``within`` limits in SI; by default all are valid. ``to_si`` converts a text.
     """
 
     def check(text: str) -> str:
         value = to_si(text, dimension)
+        if within is not None and not within[0] <= value <= within[1]:
+            raise ValueError(f"found {text}; expected {expected}")
         if expected is not None and not (value > 0 or (from_zero and value == 0)):
             raise ValueError(f"expected {expected}")
         return text

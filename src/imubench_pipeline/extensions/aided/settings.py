@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from imubench_pipeline.settings.requirements import Outage, Trajectory
 from imubench_pipeline.settings.validation import (
@@ -14,23 +14,17 @@ from imubench_pipeline.settings.validation import (
     Text,
     make_validator,
 )
-from imubench_pipeline.units import parse_difference, parse_quantity
+from imubench_pipeline.units import parse_difference
 
 _difference = make_validator("temperature", "a difference, such as 10 K", to_si=parse_difference)
 
 _AccelerationDensity = Annotated[Text, make_validator("accel_density", "a density above 0")]
-
-
-def _of_drive(text: str) -> str:
-    if parse_quantity(text, "time") > 36_000.0:
-        raise ValueError(f"found {text}; expected a drive of at most 10 h")
-    return text
-
-
-def _of_filter(text: str) -> str:
-    if not 10.0 <= parse_quantity(text, "frequency") <= 1000.0:
-        raise ValueError(f"found {text}; expected 10 Hz to 1 kHz")
-    return text
+_Drive = Annotated[
+    Duration, make_validator("time", "a drive of at most 10 h", within=(0.0, 36_000.0))
+]
+_FilterRate = Annotated[
+    Frequency, make_validator("frequency", "10 Hz to 1 kHz", within=(10.0, 1000.0))
+]
 
 
 class NavigateSettings(Strict):
@@ -45,13 +39,11 @@ class NavigateSettings(Strict):
         min_length=1,
         description="durations durations without GNSS, one after the other",
     )
-    duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
+    duration: _Drive = Field(
         "310 s",
         description="duration of a run; the first 120 s have GNSS; long enough for its outages",
     )
-    rate: Annotated[Frequency, AfterValidator(_of_filter)] = Field(
-        "50 Hz", description="sampling rate of the filter input"
-    )
+    rate: _FilterRate = Field("50 Hz", description="sampling rate of the filter input")
     runs: int = Field(
         12,
         ge=4,
