@@ -68,7 +68,7 @@ KillWait=2
 MinJobAge=3600
 SlurmdParameters=config_overrides
 NodeName=$host NodeAddr=127.0.0.1 CPUs=2 RealMemory=$memory State=UNKNOWN
-PartitionName=tests Nodes=$host Default=YES MaxTime=60 State=UP
+PartitionName=tests Nodes=$host Default=YES MaxTime=INFINITE State=UP
 CONF
 export SLURM_CONF=$folder/slurm.conf
 

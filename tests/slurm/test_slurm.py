@@ -7,18 +7,22 @@ day, in test_profile.py.
 import importlib.util
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pytest
 
 from imubench_pipeline.run.resources import Extent, compute_resources
+from tests.workflow.many import RECORDINGS, SETTINGS, put_many, read_tables, run_local
 from tests.workflow.project import Project, linked, put_log, put_sensor
 from tests.workflow.rules import costs
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
@@ -144,3 +148,48 @@ def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -
         expected = (local.results / "tables" / name).read_bytes()
         assert (project.results / "tables" / name).read_bytes() == expected, name
     assert {row["recording"] for row in project.table("scores")} == {"hungry (1)"}
+
+
+def test_a_killed_run_of_many_continues_and_makes_the_tables_of_a_local_run(
+    slurm: dict[str, str], tmp_path: Path
+) -> None:
+    put_many(tmp_path)
+    project = Project(tmp_path, tmp_path / "results", linked(tmp_path / "place"), SETTINGS, slurm)
+    command = project.command(
+        "report", "--workflow-profile", "profiles/slurm", "--group-components", "recording=10",
+        "--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "5",
+        cores=1,
+    )  # fmt: skip
+
+    def done() -> dict[Path, int]:
+        found = (project.results / "recordings").glob("*/*/scores.parquet")
+        return {path: path.stat().st_mtime_ns for path in found}
+
+    before = len(submitted(slurm))
+    with (tmp_path / "said").open("w") as said:
+        start = partial(
+            subprocess.Popen, command, cwd=project.place, env=slurm, stdout=said,
+            stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+        with start() as process:
+            while len(done()) < RECORDINGS // 2:
+                assert process.poll() is None, (tmp_path / "said").read_text()
+                time.sleep(1.0)
+            os.killpg(process.pid, signal.SIGKILL)
+        # Slurm still has its jobs: as the guide says, they are cancelled before another run.
+        subprocess.run(["scancel", "--user", str(os.getuid())], env=slurm, check=True, timeout=60)
+        while any(state in ("RUNNING", "COMPLETING") for state, *_ in submitted(slurm)):
+            time.sleep(1.0)
+        left = done()  # a step that was running has removed its outputs: one on each core
+        assert RECORDINGS // 2 - 2 <= len(left) < RECORDINGS + 3
+        first = len(submitted(slurm))
+        with start() as process:
+            assert process.wait(timeout=7200) == 0, (tmp_path / "said").read_text()
+    after = done()
+    assert len(after) == RECORDINGS + 3
+    assert sum(after[path] != written for path, written in left.items()) <= 2  # one on each core
+    jobs = [state for state, *_ in submitted(slurm)]
+    # Ten recordings a job, and the joint steps in three; the second run has fewer jobs.
+    assert first - before == -(-(RECORDINGS + 3) // 10) and len(jobs) - first < first - before + 3
+    assert set(jobs[first:]) == {"COMPLETED"}
+    assert read_tables(project) == read_tables(run_local(tmp_path))
