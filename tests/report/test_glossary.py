@@ -67,7 +67,7 @@ def theory() -> str:
         lstrip_blocks=True,
     )
     page = environment.get_template("theory.html.jinja")
-    return page.render(figure="figures/theory.svg", terms=read_glossary(), sections=())
+    return page.render(figures=("figures/theory.svg",), terms=read_glossary(), sections=())
 
 
 class Page(HTMLParser):
