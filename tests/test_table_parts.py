@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
-from imubench_pipeline.steps.tables import write_parts
+from imubench_pipeline.steps.tables import remove_parts, write_parts
 from imubench_pipeline.tables.files import TableError, build, find_tables, read
 
 STARTED = {"a": "2026-01-31T23:59:59", "b": "2026-02-01T00:00:00", "c": None}
@@ -90,5 +90,7 @@ def test_parts_without_rows_and_lost_or_damaged_parts_do_not_stay(folder: Path) 
     write([row for row in FINDINGS if row.sensor == "x"], folder)
     assert read("findings", [folder]).equals(table)
     assert read("findings", [folder]).num_rows == 9
+    remove_parts(folder)
+    assert not folder.exists() and not stored.exists()
     write([], folder)
     assert read("findings", [folder]).num_rows == 0

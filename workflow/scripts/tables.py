@@ -3,7 +3,12 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.steps.tables import describe_tables, join_all_tables, write_parts
+from imubench_pipeline.steps.tables import (
+    describe_tables,
+    join_all_tables,
+    remove_parts,
+    write_parts,
+)
 from imubench_pipeline.tables.files import write_arrow, write_json
 
 if __name__ == "__main__":
@@ -16,4 +21,6 @@ if __name__ == "__main__":
         elif output.suffix == ".parquet" and output.stem in params.parts:
             write_parts(joined[output.stem], output, joined["recordings"])
         else:
+            if output.stem not in params.parts:  # the parts of one that is also CSV stay
+                remove_parts(output)
             write_arrow(joined[output.stem], output)

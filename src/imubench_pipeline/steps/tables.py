@@ -66,4 +66,11 @@ def write_parts(table: pa.Table, folder: Path, recordings: pa.Table) -> None:
         (store / old).unlink()
 
 
+def remove_parts(path: Path) -> None:
+    """Remove the folder of a table that is to be one file, and its stored parts."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    shutil.rmtree(path.parent / _STORE / path.stem, ignore_errors=True)
+
+
 _MONTH = " month"  # no column of a table has such a name
