@@ -81,7 +81,7 @@ ELSEWHERE = {
     "tests/test_shipped.py",
     "snakemake -c2 --snakefile <checkout>/workflow/Snakefile": "tests/workflow/test_deployed.py",
     ".venv/bin/imubench compare before results --fail-on regression": "of two runs: "
-    "tests/test_compare_command.py",
+    "tests/test_compare.py",
     '.venv/bin/imubench papers results --paper maia --place "Table 3"': "of the demonstration: "
     ".ci/run",
     "docker build -f container/Dockerfile -t imubench .": "needs Docker; nothing runs it here",

@@ -15,6 +15,7 @@ import yaml
 
 from imubench_pipeline.extensions.nightly.night import Night
 from imubench_pipeline.extensions.nightly.recovery import end_left_over, remove_doubtful
+from imubench_pipeline.extensions.nightly.run_differences import load_results
 from imubench_pipeline.extensions.nightly.settling import (
     Skip,
     find_changed_logs,
@@ -39,7 +40,6 @@ from imubench_pipeline.extensions.nightly.summary import (
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.run_differences import load_results
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import replace_file, write, write_json
 from tests.test_configuration import SENSOR

@@ -19,7 +19,6 @@ from pydantic import BaseModel
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
-from imubench_pipeline.run import compare_command as comparison
 from imubench_pipeline.run import convert_command as conversion
 from imubench_pipeline.run import demo_command as demo
 from imubench_pipeline.run import formats_command as formats
@@ -375,12 +374,6 @@ COMMANDS = {
         show.add_arguments,
         show.run,
         ("shown", "", command_line.NO_RESULTS),
-    ),
-    "compare": command_line.Command(
-        "compare the results of two runs",
-        comparison.add_arguments,
-        comparison.run,
-        ("compared", "run B is worse than run A (--fail-on)", command_line.NO_RESULTS),
     ),
     "shortlist": command_line.Command(
         "judge all sensors of the catalogue for a requirement",

@@ -1,5 +1,8 @@
-"""`imubench nightly`: run the workflow on complete logs, from a timer."""
+"""Run the workflow on complete logs, from a timer; compare the results of two runs."""
 
 from imubench_pipeline.registry import Extension
 
-EXTENSION = Extension(name="nightly", commands={"nightly": "nightly.command:COMMAND"})
+EXTENSION = Extension(
+    name="nightly",
+    commands={"nightly": "nightly.command:COMMAND", "compare": "nightly.compare:COMMAND"},
+)

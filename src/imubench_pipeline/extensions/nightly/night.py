@@ -19,6 +19,7 @@ from typing import IO
 import yaml
 
 from imubench_pipeline.extensions.nightly.recovery import end_group, end_left_over, remove_doubtful
+from imubench_pipeline.extensions.nightly.run_differences import Results, load_results
 from imubench_pipeline.extensions.nightly.settling import (
     Found,
     Skip,
@@ -44,7 +45,6 @@ from imubench_pipeline.run.faults import TOLD
 from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import remove_temporary, was_restarted
-from imubench_pipeline.run.run_differences import Results, load_results
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import write_content, write_json

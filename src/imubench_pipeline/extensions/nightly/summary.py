@@ -10,6 +10,11 @@ from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from imubench_pipeline.extensions.nightly.run_differences import (
+    Results,
+    describe_differences,
+    list_differences,
+)
 from imubench_pipeline.extensions.nightly.settling import Signature
 from imubench_pipeline.model.comparisons import DriftRow, RankingRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
@@ -21,7 +26,6 @@ from imubench_pipeline.report.run_summary import (
     list_failures,
     select_warnings,
 )
-from imubench_pipeline.run.run_differences import Results, describe_differences, list_differences
 from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json

@@ -3,7 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.model.run_differences import DifferenceKind, Result, RunDifference
+from imubench_pipeline.extensions.nightly.difference_rows import (
+    DifferenceKind,
+    Result,
+    RunDifference,
+)
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.events import FITNESS_WORDS
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted, number_text

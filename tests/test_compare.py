@@ -6,9 +6,9 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.model.run_differences import DifferenceKind, Result, ResultKey
+from imubench_pipeline.extensions.nightly.difference_rows import DifferenceKind, Result, ResultKey
+from imubench_pipeline.extensions.nightly.run_differences import KINDS, list_differences
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.run.run_differences import KINDS, list_differences
 from imubench_pipeline.steps.tables import describe_tables
 from imubench_pipeline.tables.files import write, write_json
 from tests.test_show import PARAMETERS, RANKING, parameter, recording, standing

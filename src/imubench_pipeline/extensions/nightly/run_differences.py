@@ -8,7 +8,13 @@ from typing import get_args
 
 import pyarrow as pa
 
-from imubench_pipeline.model.run_differences import DifferenceKind, Result, ResultKey, RunDifference
+from imubench_pipeline.extensions.nightly.difference_rows import (
+    DifferenceKind,
+    Result,
+    ResultKey,
+    RunDifference,
+)
+from imubench_pipeline.extensions.nightly.reasons import count_text, difference_text
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import arrow_type
 from imubench_pipeline.report.practical import System, choose_page_unit
@@ -17,7 +23,6 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import find_tables, read_part
 from imubench_pipeline.words.numbers import Unit
-from imubench_pipeline.words.run_differences import count_text, difference_text
 
 TOLERANCE = 1e-9
 """Relative difference of equal values: other processors round differently."""

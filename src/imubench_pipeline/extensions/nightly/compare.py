@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from imubench_pipeline.settings.command_line import CommandError, add_units
+from imubench_pipeline.settings.command_line import NO_RESULTS, Command, CommandError, add_units
 from imubench_pipeline.tables.outputs import add_output
 
 
@@ -29,8 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
     # Loaded here, so that other commands answer at once.
     from rich.text import Text
 
+    from imubench_pipeline.extensions.nightly import run_differences as differences
     from imubench_pipeline.report.show import show
-    from imubench_pipeline.run import run_differences as differences
     from imubench_pipeline.tables.files import write_csv
 
     try:
@@ -45,3 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
     lines += differences.describe_differences(found, arguments.units, every=arguments.all)
     show(lambda width: map(Text, lines))
     return int(arguments.fail_on is not None and any(each.regression for each in found))
+
+
+COMMAND = Command(
+    "compare the results of two runs",
+    add_arguments,
+    run,
+    ("compared", "run B is worse than run A (--fail-on)", NO_RESULTS),
+)
