@@ -366,6 +366,7 @@ NO_PROGRAMS = {
     "config/README.md": "a Snakefile: tests/workflow/test_deployed.py",
     "docs/how-to/calibration.md": "tests/calibration/test_documented.py",
     "docs/how-to/scaling.md": "reads the results of several batches",
+    "docs/how-to/other_programs.md": "tests/test_other_programs.py",
 }
 """Pages with Python that is not run here, and why."""
 

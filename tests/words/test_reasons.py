@@ -55,7 +55,7 @@ ESTIMATES = [
 ]
 
 CURVES = [
-    of(curves.changes_between_parts, "contain 4 %", 0.04),
+    of(curves.changes_between_parts, "differ by 4 %", 0.04),
     of(curves.few_points, "3 of the 4 points", 3, 1 / 9, 4),
     of(curves.no_white_slope, "between −0.9 and −0.7", -0.9, -0.7),
     of(curves.no_rise, "less than 3 standard errors", 20.0, 3.0),

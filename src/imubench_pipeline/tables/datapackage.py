@@ -20,7 +20,7 @@ _CSV = {"format": "csv", "mediatype": "text/csv", "encoding": "utf-8"}
 _PARQUET = {"format": "parquet", "mediatype": "application/vnd.apache.parquet"}
 
 
-def describe_tables(software: object, csv: Container[str] = TABLES) -> dict[str, Any]:
+def describe_tables(software: object, csv: Container[str] = TABLES) -> Mapping[str, object]:
     """Return the descriptor of the joined tables: name, type, unit and meaning of each column.
 
     It follows version 2.0 of the standard. Resources are the CSV files, in which ``;`` joins lists,
