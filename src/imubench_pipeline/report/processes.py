@@ -1,5 +1,6 @@
 """Compute the items of a list in several processes, in order."""
 
+import gc
 import sys
 import warnings
 from collections import deque
@@ -44,6 +45,7 @@ def compute_in_order(
 def _receive(work: Callable[[int], Any]) -> None:
     global _work
     _work = work
+    gc.freeze()  # else looking for garbage would copy the memory of what is shared
 
 
 def _run(place: int) -> Any:

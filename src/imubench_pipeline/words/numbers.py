@@ -137,6 +137,8 @@ class Unit:
 
     def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
         """Return the number of digits of an SI value and its limits in this unit."""
+        if upper is None or (lower is None and value is not None):  # no interval
+            return count_digits(1.0, None, None, self.parameter)
         value, lower, upper = (
             None if size is None else size * self.per_si for size in (value, lower, upper)
         )

@@ -344,7 +344,9 @@ def select_turned(site: Site) -> list[RecordingView]:
 def select_predicted(site: Site) -> list[RecordingView]:
     """Return the static recordings with a prediction for the Earth's rate from their noise."""
     named = site.named_in(EarthRatePredictionRow)
-    return [view for view in site.views if view.static and view.full_name in named]
+    return site.select_compared(
+        [view for view in site.views if view.static and view.full_name in named]
+    )
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
@@ -483,10 +485,10 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
     entries = []
     unit = choose_page_unit("gyro", "adev", site.system)
     fine = choose_page_unit("accel", "adev", "si")
-    for view in site.views:
+    for view in site.select_compared(
+        [view for view in site.views if view.parts[AlignmentRow.table].num_rows]
+    ):
         rows = view.rows(AlignmentRow)
-        if not rows:
-            continue
         about = rows[0]
         gyro_bias = f"{unit.text(about.gyro_bias, 3)} {unit.sign} ({about.gyro_bias_from})"
         accel_bias = f"{fine.text(about.accelerometer_bias, 3)} {fine.sign}"
