@@ -45,7 +45,9 @@ def compute_in_order(
 def _receive(work: Callable[[int], Any]) -> None:
     global _work
     _work = work
-    gc.freeze()  # else looking for garbage would copy the memory of what is shared
+    # Looking for garbage often, and in what is shared, would copy the memory of that.
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 100)
 
 
 def _run(place: int) -> Any:

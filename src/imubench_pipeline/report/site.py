@@ -44,7 +44,7 @@ _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _PACKAGE = "imubench_pipeline"
 _FIRST_ROWS = 100  # rows of a long table that are shown at first
 _PLAIN_ROWS = 30  # rows of a long table that are plain HTML, for readers without JavaScript
-_MAX_COMPARED = 100  # recordings on a page that compares, so that it opens fast
+_MAX_COMPARED = 60  # recordings on a page that compares, so that it opens fast
 _MIN_OF_SENSOR = 3  # but of each sensor at least so many
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
