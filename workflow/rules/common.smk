@@ -228,7 +228,7 @@ ADDED_OUTPUTS = []
 """Outputs of extensions that a run makes, and no other rule reads."""
 
 SAMPLED = set()
-"""Sensors of which a step reads the samples of all recordings: they stay."""
+"""Sensors whose samples stay, because a step reads all of them."""
 
 JOBS = {}
 """The wildcards of the jobs of a step that is not of every sensor or recording."""
@@ -342,7 +342,7 @@ def remove_samples():
 
 
 def leave_out_sound(pending):
-    """Let Snakemake see no jobs of sensors and recordings of which none is pending.
+    """Hide the jobs of sensors and recordings without a pending one from Snakemake.
 
     Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
     """

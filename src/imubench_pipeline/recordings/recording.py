@@ -236,7 +236,7 @@ def read_metadata(path: Path) -> LogMetadata:
 
 
 def remove_samples(path: Path, sha256: str) -> None:
-    """Replace a file of samples, of a SHA-256, by one that has its columns and metadata alone."""
+    """Replace a file of samples, of a SHA-256, by one with its columns and metadata only."""
     metadata = json.loads(pq.read_metadata(path).metadata[METADATA]) | {"removed": sha256}
     schema = pq.read_schema(path).with_metadata({METADATA: json.dumps(metadata)})
     with replace_file(path) as temporary:

@@ -19,7 +19,7 @@ _work: Callable[[int], Any]  # of this process
 def compute_in_order(
     make: Callable[[int], Made], number: int, first: Sequence[int], processes: int
 ) -> Iterator[Made]:
-    """Yield ``make(0)`` to ``make(number - 1)``; those of ``first`` are begun first.
+    """Yield ``make(0)`` to ``make(number - 1)``, beginning with the places ``first``.
 
     ``make`` must not change anything that others use: it may run in a copy of this process. Only
     Linux copies a process safely beside the threads of numerical libraries.

@@ -25,7 +25,7 @@ rule fusion:
         "scripts/fusion.py"
 
 
-# Of recordings of boards alone, whose source compares samples by eye.
+# Only of recordings of boards, whose source compares samples by eye.
 rule samples_of_models:
     input:
         **SAMPLES_INPUT,
