@@ -13,7 +13,7 @@ import pytest
 
 import imubench_pipeline
 from imubench_pipeline.recordings.kept import remove_old_samples
-from tests.conftest import few
+from tests.conftest import PROJECT, few
 from tests.verification.finished import (
     REQUIREMENT,
     Finished,
@@ -44,7 +44,7 @@ def outlooks(*recordings: str) -> set[Job]:
 
 def joined(*recordings: str) -> set[Job]:
     sensors = {("sensor_tables", of.partition("/")[0]) for of in recordings}
-    return sensors | {(rule, "") for rule in TOGETHER}
+    return sensors | {(rule, "") for rule in ("files", *TOGETHER)}
 
 
 def replace(path: Path, old: str, new: str, count: int = 1) -> None:
@@ -88,10 +88,11 @@ def project(done: Finished, tmp_path: Path) -> Iterator[Project]:
 @pytest.fixture
 def code(project: Project, tmp_path: Path) -> Path:
     """A copy of the package that the project runs with."""
-    package = Path(imubench_pipeline.__file__).parent
-    shutil.copytree(package, tmp_path / package.name)  # with what Python has compiled
-    project.environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-    return tmp_path / package.name
+    package, checkout = Path(imubench_pipeline.__file__).parent, tmp_path / "checkout"
+    shutil.copytree(package, checkout / "src" / package.name)  # with what Python has compiled
+    (checkout / "config").symlink_to(PROJECT / "config")
+    project.environment = os.environ | {"PYTHONPATH": str(checkout / "src")}
+    return checkout / "src" / package.name
 
 
 def test_nothing_runs_again_when_dates_and_comments_alone_change(project: Project) -> None:

@@ -26,6 +26,7 @@ from imubench_pipeline.words.verdicts import (
     class_limit_text,
     condition_text,
     corrected_text,
+    evidence_summary_text,
     evidence_text,
     list_others,
     origins_text,
@@ -336,6 +337,14 @@ def test_one_sentence_names_the_sensors_to_choose() -> None:
         "B meets Drone if 2 unknown figures are good enough. No sensor meets Car or Truck. "
         "No sensor is shown to meet Train. No sensor can be judged for Ship."
     )
+
+
+def test_the_most_common_reason_of_weak_evidence_is_named() -> None:
+    one = row(evidence="weak", evidence_reasons=("one_specimen",), spread_of="this sensor")
+    few = row("b", evidence="weak", evidence_reasons=("few_axes",))
+    text = evidence_summary_text([one, few, one, row("c"), row("d", "excluded", evidence="weak")])
+    assert text == "Weak evidence for 3 of 4 verdicts: one unit."
+    assert evidence_summary_text([row(), row("b", evidence=None)]) == ""
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The overview pages: start page with the decision matrix, and all recordings."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -109,6 +110,7 @@ class Matrix:
     """All sensors and requirements."""
 
     answer: str  # the sensors to choose
+    evidence: str  # how sure it is
     columns: Sequence[Column]
     lines: Sequence[tuple[str, Sequence[Cell]]]  # by sensor, the best first
     apart: Mapping[str, str]  # sensors that are not compared, and why
@@ -160,6 +162,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         best[columns[-1].short] = rows[name, first.sensor] if first else None
     return Matrix(
         verdicts.summary_text(best, site.names),
+        verdicts.evidence_summary_text(row for key, row in rows.items() if key[1] not in apart),
         columns,
         sorted(lines.items(), key=lambda line: order(line[0])),
         apart,
@@ -268,6 +271,9 @@ def _start(site: Site) -> Mapping[str, object]:
     compared = site.select_compared(views)
     together = Comparison(site.compared(compared), site.names)
     warned = [view for view in views if view.warnings]
+    found = Counter(
+        name for view in warned for name in dict.fromkeys(row.finding for row in view.warnings)
+    )
     by_name = {view.full_name: view for view in views}
     # Of the recordings in doubt, those with a warning that nobody expects.
     unexpected = sum(
@@ -300,6 +306,7 @@ def _start(site: Site) -> Mapping[str, object]:
             for view in warned
         ],
         "in_doubt": in_doubt,
+        "found": [name for name, _ in found.most_common(2)],
         "changed": site.changed_devices(),
         "rankings": list(_list_rankings(site)),
         "next_steps": list(_list_next_steps(site)),
@@ -437,6 +444,9 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
             yield f"{site.names[group.sensor]}: {group.corrected}."
 
 
+_REMARK = re.compile(r" \([^()]*\)")
+
+
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the steps that can change most verdicts."""
     asked = site.settings["requirements"]
@@ -449,6 +459,7 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
                 if view.sensor == row.sensor and row.recording in (None, view.name)
             ),
             "text": numbers.sentence(row.text),
+            "brief": numbers.sentence(_REMARK.sub("", row.text)),
             "about": "; ".join(asked[name]["title"] for name in row.requirements),
         }
 

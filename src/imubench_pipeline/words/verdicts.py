@@ -1,6 +1,7 @@
 """Verdicts on sensors in words: requirements, conditions, evidence, doubts and next steps."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import ROUND_DOWN, Decimal
 from typing import get_args
@@ -277,6 +278,21 @@ def evidence_text(row: comparisons.RankingRow) -> str:
     if row.evidence != "weak":
         return ""
     return "; ".join(_describe_weakness(code, row) for code in row.evidence_reasons)
+
+
+def evidence_summary_text(rows: Iterable[comparisons.RankingRow]) -> str:
+    """Return how many verdicts have weak evidence, and the most common reason; empty if none."""
+    judged = [row for row in rows if row.evidence is not None and row.verdict != "excluded"]
+    reasons = [
+        _describe_weakness(code, row)
+        for row in judged
+        if row.evidence == "weak"
+        for code in row.evidence_reasons[:1]
+    ]
+    if not reasons:
+        return ""
+    reason, _ = Counter(reasons).most_common(1)[0]
+    return f"Weak evidence for {len(reasons)} of {counted(len(judged), 'verdict')}: {reason}."
 
 
 def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
