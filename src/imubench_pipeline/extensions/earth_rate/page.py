@@ -402,6 +402,7 @@ EARTH_RATE_PAGE = Entry(
     title="Earth’s rate",
     about="a gyro turned between north and south: how well it senses the Earth’s rate",
     context=_make_context,
+    tables=("ranking",),
     views=_select_recordings,
     exists=lambda site: bool(_select_recordings(site)),
     place=4,
