@@ -67,12 +67,12 @@ class NavigationLine:
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
-    rows = site.rows(NavigationRow)
+    views = site.select_compared(site.views)
+    compared = {view.full_name for view in views}
+    rows = [row for row in site.rows(NavigationRow) if (row.sensor, row.recording) in compared]
     shown = [row for row in rows if row.position is not None]
-    recordings = [view.row for view in site.views]
+    recordings = [view.row for view in views]
     apart = list_excluded(recordings)
-    compared = {view.full_name for view in site.select_compared(site.views)}
-    listed = [row for row in rows if (row.sensor, row.recording) in compared]
     deciding = [row for row in shown if (row.sensor, row.recording) not in apart]
     return {
         "answers": list(describe_tunings(shown)),
@@ -83,8 +83,8 @@ def _make_context(site: Site) -> Mapping[str, object]:
             for row in shown
             if (key := (row.sensor, row.recording)) in apart
         },
-        "lines": [describe_row(row) for row in listed if row.position is not None],
-        "lacking": [describe_row(row) for row in listed if row.reason],
+        "lines": [describe_row(row) for row in shown],
+        "lacking": [describe_row(row) for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
             "outage": list(dict.fromkeys(_format_outage(row) for row in shown)),
