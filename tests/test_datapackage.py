@@ -11,6 +11,8 @@ from imubench_pipeline.steps.tables import describe_tables
 from imubench_pipeline.tables.files import build, make_schema, write_arrow, write_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.tables import joined, recording_rows
+from tests.verification.finished import REQUIREMENT, put_requirement
+from tests.workflow.project import put_log, put_sensor
 
 SOFTWARE = {"version": "1.2", "settings": "0123456789abcdef"}
 
@@ -99,6 +101,21 @@ def test_the_digest_of_the_settings_changes_with_them_and_not_with_places(tmp_pa
     other = describe(tmp_path, estimate={"longest": 0.25})
     assert other["settings"] != first["settings"]
     assert other["version"] == first["version"]
+
+
+def test_the_digest_of_the_settings_leaves_out_what_no_table_has(tmp_path: Path) -> None:
+    def digest(requirement: dict[str, Any] = REQUIREMENT, **changes: object) -> str:
+        put_sensor(tmp_path / "sensors/one.yaml", **changes)
+        put_requirement(tmp_path, **requirement)
+        folders = {name: str(tmp_path / name) for name in ("sensors", "requirements")}
+        return describe(tmp_path, **folders)["settings"]
+
+    put_log(tmp_path / "logs/one/a.csv", 1, 10)
+    first = digest()
+    assert digest({"title": "Rover", "note": "none", "example": True}) == first
+    assert digest(price="20 EUR", interface="SPI") == first
+    assert digest({"static_window": "20 s"}) != first
+    assert digest(price_class="consumer") != first
 
 
 @pytest.mark.release

@@ -44,6 +44,8 @@ from imubench_pipeline.units import parse_quantity
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
 _NOT_IN_RESULTS = ("limits", "report", "samples", "tables")  # settings that change no result
 _RANKING_KEYS = ("price_class", "must")  # keys of a requirement that do not affect the error budget
+_REPORT_KEYS = ("title", "note", "example")  # keys of a requirement that only the report shows
+_LISTING_KEYS = {"price", "interface"}  # keys of a sensor that only `imubench sensors` prints
 
 _REPORTED_SECTIONS = {  # sections of the settings that the report shows
     *("allan", "estimate", "reconstruction", "quality"),
@@ -384,7 +386,7 @@ class Plan:
                 {
                     "error_budget": self.run.error_budget,
                     "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
-                    "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
+                    "requirements": self._requirements(*_RANKING_KEYS, *_REPORT_KEYS),
                     "figures": state_figures(self.sensors.get(sensor)),
                 }
             )
@@ -393,7 +395,7 @@ class Plan:
     def ranking_settings(self) -> str:
         """Return the settings of the ranking: requirements, and sensors that are for sale."""
         sensors = self._for_sale()
-        requirements = self._requirements("title", "note", "example")
+        requirements = self._requirements(*_REPORT_KEYS)
         return to_json({"requirements": requirements, "sensors": sensors})
 
     def _for_sale(self) -> dict[str, dict[str, object]]:
@@ -497,8 +499,11 @@ class Plan:
         used = {sensor for sensor, _ in self.recordings} & self.sensors.keys()
         settings = [
             self.run.model_dump(mode="json", exclude={*ignored, *_NOT_IN_RESULTS}),
-            {name: self.sensors[name] for name in used},
-            self.requirements,
+            {
+                name: self.sensors[name].model_dump(mode="json", exclude=_LISTING_KEYS)
+                for name in used
+            },
+            self._requirements(*_REPORT_KEYS),
             [*self.simulated.values()],
         ]
         digest = hashlib.sha256(to_json(settings).encode()).hexdigest()
