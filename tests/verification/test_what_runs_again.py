@@ -44,7 +44,7 @@ def outlooks(*recordings: str) -> set[Job]:
 
 def joined(*recordings: str) -> set[Job]:
     sensors = {("sensor_tables", of.partition("/")[0]) for of in recordings}
-    return sensors | {(rule, "") for rule in ("files", *TOGETHER)}
+    return sensors | {(rule, "") for rule in TOGETHER}
 
 
 def replace(path: Path, old: str, new: str, count: int = 1) -> None:

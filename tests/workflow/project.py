@@ -31,6 +31,7 @@ STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budge
 
 TOGETHER = (
     "tables",
+    "files",
     "ranking",
     "shortlist",
     "repeatability",

@@ -29,7 +29,7 @@ from tests.workflow.project import (
 pytestmark = pytest.mark.release  # every day test_failures.py, and the demonstration
 
 STEPS_OF_A_RECORDING = dict.fromkeys(STEPS, 1)
-GLOBAL_STEPS = dict.fromkeys(("sensor_tables", "files", *TOGETHER), 1)
+GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
 
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
 
