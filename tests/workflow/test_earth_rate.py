@@ -118,7 +118,7 @@ def test_what_is_wrong_stands_in_tables_and_pages(project: Project) -> None:
     assert {row["status"] for row in estimates(project, "still").values()} == {"no_turns"}
     reason = next(row["reason"] for row in project.table("recordings")
                   if row["recording"] == "nowhere")  # fmt: skip
-    assert "nowhere.yaml: two_position: latitude is missing; expected where" in reason
+    assert "nowhere.yaml: two_position: latitude is missing; expected the latitude" in reason
     report = project.results / "report"
     page = (report / "earth_rate.html").read_text()
     assert "latitude is missing" in page and "No turns: nothing shows" in page
