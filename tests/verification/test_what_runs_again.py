@@ -10,12 +10,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 
 import imubench_pipeline
 from imubench_pipeline.recordings.kept import remove_old_samples
 from tests.conftest import PROJECT, few
 from tests.verification.finished import (
     REQUIREMENT,
+    SIMULATED,
     Finished,
     project_in,
     put_requirement,
@@ -205,7 +207,11 @@ def test_an_edit_of_a_requirement_runs_every_error_budget(project: Project) -> N
 def test_edits_of_titles_run_the_report(project: Project) -> None:
     put_requirement(project.folder, title="Rover", note="of no consequence")
     project.settings.append('report={"title": "Sensors"}')
-    assert project.job_list() == {("report", "")}
+    simulated = project.folder / "simulated.yaml"
+    with restored(simulated):
+        entry = SIMULATED | {"shows": {"steps": "a step in the rate"}}
+        simulated.write_text(yaml.safe_dump({"recordings": [entry]}))
+        assert project.job_list() == {("report", "")}
 
 
 @pytest.mark.release

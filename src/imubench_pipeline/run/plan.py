@@ -491,7 +491,7 @@ class Plan:
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
-        return to_json([*entries])
+        return to_json([*map(_dump_for_tables, entries)])
 
     def describe_software(self) -> str:
         """Return the version of the program, and a digest of all settings that affect results."""
@@ -504,7 +504,7 @@ class Plan:
                 for name in used
             },
             self._requirements(*_REPORT_KEYS),
-            [*self.simulated.values()],
+            [*map(_dump_for_tables, self.simulated.values())],
         ]
         digest = hashlib.sha256(to_json(settings).encode()).hexdigest()
         return to_json({"version": version("imubench_pipeline"), "settings": digest[:16]})
@@ -513,6 +513,11 @@ class Plan:
     def code(step: str, package: str = "steps") -> str:
         """Return the digest of the code of a step, which is the module of its name in a package."""
         return digest_sources(f"{package}.{step}")
+
+
+def _dump_for_tables(recording: simulations.SimulatedRecording) -> dict[str, Any]:
+    """Return the settings of a simulated recording without the texts that only the report shows."""
+    return recording.model_dump(mode="json", exclude={"shows"})
 
 
 def _dump_for_samples(recording: simulations.SimulatedRecording) -> dict[str, Any]:
