@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.run.cli import main
+from tests.report.pages import unfolded
 from tests.workflow.project import (
     BAD,
     CHANNELS,
@@ -96,6 +97,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "shortlist.html",
         "fusion.html",
         "earth_rate.html",
+        "experiments.html",
         "theory.html",
         "made.html",
         "sensors/one.html",
@@ -220,8 +222,8 @@ def test_what_the_samples_look_like_is_kept_with_each_recording(project: Project
         assert not (project.results / f"tables/{name}.parquet").exists()
     counted = sum(row["count"] for row in rows if row["channel"] == "gyro_x")
     assert counted == 20_000
-    page = (project.results / "report/recordings/one/a.html").read_text()
-    assert 'data-kind="series"' in page and 'data-kind="histogram"' in page
+    page = unfolded((project.results / "report/recordings/one/a.html").read_text())
+    assert 'data-kind="timeline"' in page and 'data-kind="histogram"' in page
 
 
 def test_a_second_run_has_nothing_to_do(project: Project) -> None:
