@@ -58,6 +58,7 @@ class SourcedInterval(str):
 
 
 _MAX_DIGITS = 3  # of errors, whose intervals do not include the limits of a class
+_MAX_REASONS = 2  # of an error in a cell; the tables of a run have all
 
 
 def source_number(
@@ -215,7 +216,7 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         parts=[verdicts.share_text(share) for share in row.parts] or [numbers.NO_VALUE],
         reached=numbers.duration_text(row.reached_after),
         decides=row.decides,
-        reason="; ".join(row.reasons),
+        reason=numbers.join_first(row.reasons, _MAX_REASONS),
         backtest=describe_backtest(row),
     )
 

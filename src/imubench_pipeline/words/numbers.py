@@ -60,6 +60,12 @@ def join_names(names: Sequence[str], by: str = "and") -> str:
     return f" {by} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
+def join_first(texts: Sequence[str], most: int) -> str:
+    """Return the first texts of a list, and how many more there are."""
+    more = len(texts) - most
+    return "; ".join(texts[:most]) + (f"; and {more} more" if more > 0 else "")
+
+
 def digit_limits(parameter: str = "") -> tuple[int, int]:
     """Return the minimum and maximum digits of a parameter, or of any other value."""
     return DIGITS.get(parameter) or DIGITS["default"]

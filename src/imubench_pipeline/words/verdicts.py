@@ -19,6 +19,7 @@ from imubench_pipeline.words.findings.base import channels_text
 from imubench_pipeline.words.numbers import (
     counted,
     duration_text,
+    join_first,
     join_names,
     number_text,
     percent_text,
@@ -321,8 +322,7 @@ def doubts_text(doubts: Iterable[verdicts.DoubtMark], *, named: bool = False, mo
             for doubt in doubts
         )
     )
-    more = len(texts) - most
-    return "; ".join(texts[:most]) + (f"; and {more} more" if more > 0 else "")
+    return join_first(texts, most)
 
 
 def used_doubts_text(row: comparisons.RankingRow) -> str:
