@@ -99,7 +99,7 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     recordings = [RecordingRow(**recording("best")),
                   RecordingRow(**recording("made", simulated=True))]  # fmt: skip
     assert list(list_best_sensors(ranking, recordings)) == [
-        "robot: best meets the limits. Best of 2 sensors (weak evidence: one unit). "
+        "robot: best meets the limits. Best of 2 sensors (weak evidence: one specimen). "
         "The difference from other is not significant.",
         "hard: No sensor meets the limits. made (simulated) is closest, but fails. "
         "Only sensor with usable data.",

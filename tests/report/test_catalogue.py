@@ -100,9 +100,9 @@ def test_published_figures_are_counted_by_figure() -> None:
         *covered("c", {"N": "no", "offset": "not looked up"}, quantity="accel"),
     )
     gyro, accel = make_catalogue_tables(rows, [], "practical")
-    assert gyro["counts"] == ["printed by 2 of 3", "printed by 2 of 2; not looked up: 1"]
+    assert gyro["counts"] == ["2 of 3 looked up", "2 of 2 looked up; 1 others not"]
     assert [line["name"] for line in gyro["lines"]] == ["u A", "V B", "V C"]
-    assert accel["counts"] == ["printed by 0 of 1", "printed by 0 of 0; not looked up: 1"]
+    assert accel["counts"] == ["0 of 1 looked up", "0 of 0 looked up; 1 others not"]
     assert list(make_catalogue_tables([], [], "practical")) == []
 
 

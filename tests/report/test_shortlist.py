@@ -52,8 +52,8 @@ def test_all_sensors_have_their_margins_and_sources(read: dict[str, Read]) -> No
     for text in (
         *("meets if …", "0.25", "1.23", "simulated logs", HOSTILE),
         "its gyro scale factor error is below 1200 ppm (1σ; 3 of 20 sensors print so little)",
-        "worst of its class 90 %, noise 10 %",
-        "gyro scale factor (worst of its class) 90 %",
+        "assumed worst of class 90 %, noise 10 %",
+        "gyro scale factor (assumed worst of class) 90 %",
     ):
         assert text in line.text
     (line,) = page.naming("weak", "tr")

@@ -183,8 +183,8 @@ def test_an_excluded_sensor_has_its_shortfalls() -> None:
     ("origin", "words"),
     [
         ("measured", " (measured)"),
-        ("datasheet", " (printed)"),
-        ("class limit", " (worst of its class)"),
+        ("datasheet", " (datasheet)"),
+        ("class limit", " (assumed worst of class)"),
         ("requirement", ""),
     ],
 )
@@ -202,7 +202,7 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("misalignment", "gyro", share=0.1, origin="class limit"),
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
-    assert origins_text(shares) == "worst of its class 60 %, noise 35 %, printed 5 %"
+    assert origins_text(shares) == "assumed worst of class 60 %, noise 35 %, datasheet 5 %"
 
 
 @pytest.mark.parametrize(
@@ -224,9 +224,9 @@ def test_a_class_limit_is_named(
 
 def test_margins_other_than_in_use() -> None:
     both = row(margin=0.5, noise_margin=4.234, likely_margin=0.9)
-    assert other_margins_text(both) == "noise alone 4.2, likely 0.9"
+    assert other_margins_text(both) == "noise alone 4.23, likely 0.9"
     # Where every figure is known, the likely margin is the margin in use.
-    assert other_margins_text(replace(both, likely_margin=0.5)) == "noise alone 4.2"
+    assert other_margins_text(replace(both, likely_margin=0.5)) == "noise alone 4.23"
     assert other_margins_text(row()) == ""
 
 
@@ -245,10 +245,10 @@ def test_evidence_is_weak_for_reasons() -> None:
     assert weak() == ""
     assert evidence_text(row(evidence=None)) == ""
     assert weak("one_specimen", "short_log", "few_axes") == (
-        "one unit; one log of 11 min; fewer than three axes"
+        "one specimen; one log of 11 min; fewer than three axes"
     )
     assert weak("one_specimen", "periodic_drift", "not_explained", spread_of="other sensors") == (
-        "one unit, spread taken from other sensors; the bias of the data oscillates slowly; "
+        "one specimen, spread taken from other sensors; the bias of the data oscillates slowly; "
         "no model explains the spectrum of the data"
     )
     assert weak("short_log", "wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
@@ -343,7 +343,7 @@ def test_the_most_common_reason_of_weak_evidence_is_named() -> None:
     one = row(evidence="weak", evidence_reasons=("one_specimen",), spread_of="this sensor")
     few = row("b", evidence="weak", evidence_reasons=("few_axes",))
     text = evidence_summary_text([one, few, one, row("c"), row("d", "excluded", evidence="weak")])
-    assert text == "Weak evidence for 3 of 4 verdicts: one unit."
+    assert text == "Weak evidence for 3 of 4 verdicts: one specimen."
     assert evidence_summary_text([row(), row("b", evidence=None)]) == ""
 
 
@@ -376,7 +376,7 @@ def test_weak_evidence_stands_with_the_answer() -> None:
                longest_log=660.0)  # fmt: skip
     assert answer(weak) == (
         "A meets the limits. Only sensor with usable data (weak evidence: one log of 11 min; "
-        "one unit)."
+        "one specimen)."
     )
 
 

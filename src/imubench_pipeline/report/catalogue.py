@@ -128,8 +128,8 @@ def format_counts(published: Iterable[str]) -> str:
     """Return how many sensors publish a figure, and for how many it was not looked up."""
     counts = Counter(published)
     unknown = counts["not looked up"]
-    text = f"printed by {sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown}"
-    return f"{text}; not looked up: {unknown}" if unknown else text
+    text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown} looked up"
+    return f"{text}; {unknown} others not" if unknown else text
 
 
 def _make_share(rows: Sequence[CoverageRow]) -> Json:

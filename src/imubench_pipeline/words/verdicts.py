@@ -237,7 +237,7 @@ def share_text(share: verdicts.Share) -> str:
 
 
 def origins_text(shares: Iterable[verdicts.Share]) -> str:
-    """Return the parts of the variance by origin: ``noise 40 %, printed 10 %, class 50 %``."""
+    """Return the parts of the variance by origin: ``noise 40 %, datasheet 10 %``."""
     parts: dict[str, float] = {}
     for share in shares:
         noise = share.is_noise and share.origin != "class limit"
@@ -249,8 +249,8 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
 
 _ORIGIN_WORDS: Mapping[Origin, str] = {
     "measured": "measured",
-    "datasheet": "printed",
-    "class limit": "worst of its class",
+    "datasheet": "datasheet",
+    "class limit": "assumed worst of class",
     "requirement": "stated",
 }
 """Origin of a figure in words."""
@@ -300,7 +300,7 @@ def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
     match code:
         case "one_specimen":
             borrowed = row.spread_of == "other sensors"
-            return "one unit" + ", spread taken from other sensors" * borrowed
+            return "one specimen" + ", spread taken from other sensors" * borrowed
         case "short_log":
             length = duration_text(row.longest_log)
             return f"one log of {length}" if row.recordings == 1 else f"no log longer than {length}"
@@ -334,9 +334,10 @@ def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -
     """Return the margins other than in use: ``noise alone 4.2, likely 0.9``."""
     parts = []
     if row.noise_margin is not None:
-        parts.append(f"noise alone {number_text(row.noise_margin, 2)}")
-    if row.likely_margin is not None and row.likely_margin != row.margin:
-        parts.append(f"likely {number_text(row.likely_margin, 2)}")
+        parts.append(f"noise alone {number_text(row.noise_margin, 3)}")
+    likely = number_text(row.likely_margin, 3)
+    if row.likely_margin is not None and likely != number_text(row.margin, 3):
+        parts.append(f"likely {likely}")
     return ", ".join(parts)
 
 
