@@ -53,7 +53,7 @@ def test_browser_without_decompression_shows_plain_content_and_an_alert(
         page.goto((bench.folder / path).as_uri())
         page.wait_for_function(READY)
         assert "Firefox 113" in page.get_by_role("alert").inner_text()
-    table = page.get_by_role("table", name="Gyroscope: recommended values")
+    table = page.get_by_role("table", name="Gyroscope: noise parameters")
     assert table.is_visible() and table.locator("data").first.inner_text()
     page.close()
     assert complaints == []
