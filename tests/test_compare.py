@@ -9,7 +9,7 @@ import pytest
 from imubench_pipeline.extensions.nightly.difference_rows import DifferenceKind, Result, ResultKey
 from imubench_pipeline.extensions.nightly.run_differences import KINDS, list_differences
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.steps.tables import describe_tables
+from imubench_pipeline.tables.datapackage import describe_tables
 from imubench_pipeline.tables.files import write, write_json
 from tests.test_show import PARAMETERS, RANKING, parameter, recording, standing
 

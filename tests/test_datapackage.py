@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.steps.tables import describe_tables
+from imubench_pipeline.tables.datapackage import describe_tables
 from imubench_pipeline.tables.files import build, make_schema, write_arrow, write_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.tables import joined, recording_rows

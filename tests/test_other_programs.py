@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.steps.tables import describe_tables
+from imubench_pipeline.tables.datapackage import describe_tables
 from imubench_pipeline.tables.files import write_arrow, write_json
 from imubench_pipeline.tables.schemas import TABLES
 from tests.conftest import PROJECT

@@ -33,6 +33,19 @@ def step(action: Action, turned: int = 1, strengthened: int = 0, **values: Any) 
     )  # fmt: skip
 
 
+def test_a_brief_step_leaves_out_how_to_measure() -> None:
+    found = NextStepRow(
+        sensor="s",
+        requirements=("robot",),
+        action="find_figures",
+        figures=FIGURES[:1],
+        verdicts_turned=2,
+        verdicts_strengthened=0,
+    )
+    expected = "Look up or measure the gyro scale factor error: this decides 2 verdicts"
+    assert next_step_text(found, brief=True) == expected
+
+
 @pytest.mark.parametrize("action", get_args(Action))
 def test_a_step_is_a_sentence(action: Action) -> None:
     for counts in ((1, 0), (0, 1), (2, 1)):

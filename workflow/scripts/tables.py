@@ -3,12 +3,8 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.steps.tables import (
-    describe_tables,
-    join_all_tables,
-    remove_parts,
-    write_parts,
-)
+from imubench_pipeline.steps.tables import join_all_tables, remove_parts, write_parts
+from imubench_pipeline.tables.datapackage import describe_tables
 from imubench_pipeline.tables.files import write_arrow, write_json
 
 if __name__ == "__main__":

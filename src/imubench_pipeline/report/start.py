@@ -1,7 +1,6 @@
 """The overview pages: start page with the decision matrix, and all recordings."""
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -444,9 +443,6 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
             yield f"{site.names[group.sensor]}: {group.corrected}."
 
 
-_REMARK = re.compile(r" \([^()]*\)")
-
-
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the steps that can change most verdicts."""
     asked = site.settings["requirements"]
@@ -459,7 +455,7 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
                 if view.sensor == row.sensor and row.recording in (None, view.name)
             ),
             "text": numbers.sentence(row.text),
-            "brief": numbers.sentence(_REMARK.sub("", row.text)),
+            "brief": numbers.sentence(verdicts.next_step_text(row, brief=True)),
             "about": "; ".join(asked[name]["title"] for name in row.requirements),
         }
 

@@ -8,7 +8,6 @@ import pyarrow as pa
 
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.recordings.fitness import WITH_DOUBTS, attach_doubts, exclude_simulated
-from imubench_pipeline.tables.datapackage import describe_tables as describe_tables
 from imubench_pipeline.tables.failures import Failure, mark_failures, read_with_failures
 from imubench_pipeline.tables.files import build, link_part, make_folder
 from imubench_pipeline.tables.keys import split_table

@@ -499,8 +499,11 @@ def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]
     ]
 
 
-def next_step_text(step: comparisons.NextStepRow) -> str:
-    """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
+def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:
+    """Return a next step: ``Record 3 more units: this could settle 1 verdict``.
+
+    ``brief``: without how to measure a figure.
+    """
     parts = []
     if step.verdicts_turned:
         changed = counted(step.verdicts_turned, "verdict")
@@ -509,10 +512,10 @@ def next_step_text(step: comparisons.NextStepRow) -> str:
         parts.append(f"give {counted(step.verdicts_strengthened, 'verdict')} stronger evidence")
         if len(parts) == 1:
             parts[0] = f"this would {parts[0]}"
-    return f"{_describe_action(step)}: {' and '.join(parts)}"
+    return f"{_describe_action(step, brief=brief)}: {' and '.join(parts)}"
 
 
-def _describe_action(step: comparisons.NextStepRow) -> str:
+def _describe_action(step: comparisons.NextStepRow, *, brief: bool) -> str:
     quantities = " and ".join(SENSORS[name] for name in step.quantities)
     match step.action:
         case "check_unit":
@@ -521,7 +524,7 @@ def _describe_action(step: comparisons.NextStepRow) -> str:
         case "find_figures":
             names = join_names(list(map(subject_text, step.figures)))
             causes = {condition.figure for condition in step.figures} - {None}
-            hints = [_MEASURING[cause] for cause in _MEASURING if cause in causes]
+            hints = [_MEASURING[cause] for cause in _MEASURING if cause in causes and not brief]
             verb = "Look up or measure" if causes else "Look up"
             return f"{verb} the {names}" + f" ({'; '.join(hints)})" * bool(hints)
         case "record_again":
