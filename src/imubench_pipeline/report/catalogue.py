@@ -189,8 +189,6 @@ DATASHEETS = Entry(
     file="datasheets.html",
     title="Datasheets",
     context=_make_context,
-    tables=("catalogue", "coverage"),
     exists=lambda site: bool(site.rows(CoverageRow)),
-    views=lambda site: site.views,
 )
 """The page of all comparisons with datasheets, and of the figures that vendors publish."""

@@ -202,7 +202,7 @@ def publish(
     unchanged = {
         path: key
         for path, key in before.items()
-        if path in keys
+        if keys.get(path)
         and (folder / path).is_file()
         and key == _make_key(keys[path], (folder / path).read_bytes())
     }

@@ -511,8 +511,6 @@ START = Entry(
     file="index.html",
     title="Comparison",
     context=_start,
-    tables=("failures", "files", "pooled", "ranking", "next_steps", "drift", "coverage"),
-    views=lambda site: site.views,
 )
 """The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
@@ -521,6 +519,5 @@ RECORDINGS = Entry(
     title="Recordings",
     about="every recording with its status, length, rate and warnings",
     context=_recordings,
-    views=lambda site: site.views,
 )
 """The page that lists every recording with its state."""

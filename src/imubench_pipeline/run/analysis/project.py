@@ -180,18 +180,19 @@ def _is_same_unit(unit: str, other: str, channel: str) -> bool:
         raise ConfigError(str(error)) from None
 
 
-def inspect_log(log: Path, topics: Sequence[str] = ()) -> Inspection:
+def inspect_log(log: Path, topics: Sequence[str] = (), model: str | None = None) -> Inspection:
     """Return what a log holds, within bounds of time and memory; ConfigError if it cannot be read.
 
-    ``topics`` of a bag; none: all.
+    ``topics`` of a bag; none: all. ``model``: its sensor in the draft; None: by the log.
     """
     try:
         inspected: Inspection = run_bounded(
-            INSPECTED_S, INSPECTED_BYTES, inspect, log, None, topics
+            INSPECTED_S, INSPECTED_BYTES, inspect, log, model, topics
         )
     except BoundError as error:
         raise ConfigError(
-            f"{log}: to look into it {error}; expected the log of an inertial sensor"
+            f"{log.name}: to list it {error}; expected the log of an inertial sensor: copy what it "
+            "measured into a file of its own"
         ) from None
     except (RecordingError, OSError) as error:
         raise ConfigError(str(error)) from None
