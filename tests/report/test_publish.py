@@ -596,7 +596,7 @@ def test_a_second_run_writes_nothing(report: Report) -> None:
     age(report.folder)
     told: list[str] = []
     assert publish(made, report.folder, told.append) == []
-    assert told == []
+    assert not [page for page in told if "/" in page]
     assert touched(report.folder) == set()
 
 

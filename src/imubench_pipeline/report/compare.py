@@ -89,7 +89,6 @@ def _make_context(site: Site) -> Mapping[str, object]:
 
 
 def _describe_verdict(row: RankingRow) -> str:
-    """Return the verdict of a row of ``ranking`` with its margins: in use, and others."""
     margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
     margins.append(verdicts.other_margins_text(row))
     return ", ".join(filter(None, [verdicts.SHORT_VERDICTS[row.verdict], *margins]))
@@ -164,7 +163,6 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays) -> Json | None:
 
 
 def _number_sources(kept: Mapping[str, Any]) -> Any:
-    """Return a number for the source of each row."""
     numbers = np.zeros(len(kept["source"]), dtype=np.intp)
     for name in _SOURCE_COLUMNS:
         codes, values = pd.factorize(kept[name], use_na_sentinel=False)

@@ -13,6 +13,7 @@ from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers, verdicts
 
 
@@ -58,7 +59,6 @@ class SourcedInterval(str):
 
 
 def _is_wide(interval: str) -> bool:
-    """Return whether the limits of an interval differ as printed."""
     return isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
 
 
@@ -181,10 +181,8 @@ def format_rankings(
 ) -> Iterator[Ranking]:
     """Yield the ranking for each requirement; ``requirements``: text from the plan."""
     for name, declared in requirements.items():
-        by_sensor: dict[str, list[RankingRow]] = {}
-        for row in rows:
-            if row.requirement == name:
-                by_sensor.setdefault(row.sensor, []).append(row)
+        own = (row for row in rows if row.requirement == name)
+        by_sensor = group_rows(own, lambda row: row.sensor)
         groups = [_group(limits, simulated, system) for limits in by_sensor.values()]
         # By rank, then by margin; sensors without a rank come last.
         groups.sort(key=lambda group: (group.row.rank or 10**6, -(group.row.margin or 0.0)))
@@ -236,7 +234,6 @@ ErrorRow = RankingRow | ErrorBudgetRow
 
 
 def _expected(row: ErrorRow, system: System) -> str:
-    """Return the error of a row; a dash where it is not known."""
     if row.sigma is None:
         return numbers.NO_VALUE
     unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
@@ -278,13 +275,12 @@ def make_budget_tables(
 ) -> Iterator[Json]:
     """Yield the error budget of each recording: a line per error and axis, a column per time."""
     own = [row for row in rows if row.requirement is None]
-    for key in dict.fromkeys((row.sensor, row.recording) for row in own):
-        parts = [row for row in own if (row.sensor, row.recording) == key]
+    for key, parts in group_rows(own, lambda row: (row.sensor, row.recording)).items():
         times = list(dict.fromkeys(row.time for row in parts))
         lines: dict[tuple[str, tuple[float | None, ...]], Json] = {}
         missing: dict[str, None] = {}
-        for error, axis in dict.fromkeys((row.error, row.axis) for row in parts):
-            chosen = [row for row in parts if (row.error, row.axis) == (error, axis)]
+        by_axis = group_rows(parts, lambda row: (row.error, row.axis))
+        for (error, axis), chosen in by_axis.items():
             sigmas = tuple(row.sigma for row in chosen if row.source == "total")
             if not any(sigmas):
                 missing[f"{_NAMES[error]}: {'; '.join(chosen[0].reasons) or 'not known'}"] = None
@@ -312,10 +308,8 @@ def make_budget_tables(
 def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
     """Return a bar for each error and time of the worst axes of a recording: its variance."""
     own = [row for row in rows if row.requirement is None]
-    groups: dict[tuple[str, float], list[ErrorBudgetRow]] = {}
-    for row in own:
-        if row.axis == own[0].axis:
-            groups.setdefault((row.error, row.time), []).append(row)
+    worst = (row for row in own if row.axis == own[0].axis)
+    groups = group_rows(worst, lambda row: (row.error, row.time))
     bars: list[Json] = []
     for (error, time), parts in sorted(groups.items(), key=lambda of: _ERRORS.index(of[0][0])):
         total = _total(parts)
@@ -337,12 +331,10 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
 
 
 def _total(rows: Iterable[ErrorBudgetRow]) -> ErrorBudgetRow | None:
-    """Return the row of the total among the rows of an error and a time."""
     return next((row for row in rows if row.source == "total"), None)
 
 
 def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
-    """Return an error with its interval and its sources."""
     total = _total(rows)
     if total is None or total.sigma is None:
         return {

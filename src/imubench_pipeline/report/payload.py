@@ -3,18 +3,18 @@
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow, ModelSampleRow
-from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import METHOD_STYLES, Appearance
 from imubench_pipeline.report.practical import format_printed
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.tables.keys import group_rows
 
 Json = dict[str, Any]
 """Data of a page for its scripts."""
@@ -253,14 +253,14 @@ def pack_samples(
     return {
         "envelope": {
             channel: {"start": rows[0].start, "end": rows[-1].end, **_pack_envelope(rows, arrays)}
-            for channel, rows in _group_by_channel(envelope).items()
+            for channel, rows in group_rows(envelope, lambda row: row.channel).items()
         },
         "histogram": {
             channel: {
                 "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
                 "count": arrays.log([row.count for row in bins]),
             }
-            for channel, bins in _group_by_channel(histogram).items()
+            for channel, bins in group_rows(histogram, lambda row: row.channel).items()
         },
     }
 
@@ -275,7 +275,7 @@ MODEL_SAMPLE_NAMES = {
 def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
     """Return the samples of a log and of logs simulated from its models, by channel."""
     drawn: Json = {}
-    for channel, of_channel in _group_by_channel(rows).items():
+    for channel, of_channel in group_rows(rows, lambda row: row.channel).items():
         drawn[channel] = {}
         for of, name in MODEL_SAMPLE_NAMES.items():
             envelope = [row for row in of_channel if (row.of, row.what) == (of, "envelope")]
@@ -294,16 +294,6 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
     names = ("low", "high", "mean")
     return {n: arrays.even(fill_missing(getattr(row, n) for row in rows)) for n in names}
-
-
-_OfChannel = TypeVar("_OfChannel", bound=ChannelRow)
-
-
-def _group_by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]:
-    channels: dict[str, list[_OfChannel]] = {}
-    for row in rows:
-        channels.setdefault(row.channel, []).append(row)
-    return channels
 
 
 def fill_missing(values: Iterable[float | None]) -> list[float]:

@@ -20,7 +20,6 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
-    """Return the units of all symbols; ``level``: unit of B and of the Allan deviation."""
     return {
         **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},

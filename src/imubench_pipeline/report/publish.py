@@ -129,7 +129,6 @@ def _find_unit(reference: str, system: System) -> Unit:
 
 @jinja2.pass_context
 def _link_to(context: Context, path: str) -> str:
-    """Return the relative link from this page to another page or file."""
     return str(context["root"]) + quote(path)
 
 
@@ -152,7 +151,6 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
 
 
 def _make_json(value: Any) -> Markup:
-    """Return JSON that is safe inside a script element."""
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 
@@ -202,7 +200,7 @@ def publish(
     unchanged = {
         path: key
         for path, key in before.items()
-        if keys.get(path)
+        if path in keys
         and (folder / path).is_file()
         and key == _make_key(keys[path], (folder / path).read_bytes())
     }
@@ -211,7 +209,7 @@ def publish(
         _put(folder, KEYS, _format_json(unchanged))
     templates = make_templates(site.system)
     shown = dict(unchanged)
-    changed = [page for page in every if page.path not in unchanged]
+    changed = [page for page in every if not page.key or page.path not in unchanged]
 
     def make(place: int) -> tuple[bytes, str | None]:
         rendered = _make_page(site, templates, changed[place]).encode()
@@ -257,7 +255,6 @@ def _make_key(key: str, content: bytes) -> str:
 
 
 def _read_keys(path: Path) -> dict[str, str]:
-    """Return the digests of the existing pages; empty if they are unknown."""
     try:
         return {page: str(key) for page, key in read_json(path).items()}
     except (OSError, ValueError, AttributeError):

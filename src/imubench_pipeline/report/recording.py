@@ -113,7 +113,6 @@ def describe_thermal(channel: ChannelView, system: System) -> list[str]:
 
 
 def _describe_reduction(channel: ChannelView) -> str:
-    """Return the factors by which compensation lowers the Allan deviation, as a sentence."""
     left = channel.compensated
     if not left:
         return ""
@@ -224,7 +223,6 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
 
 
 def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]:
-    """Return an event as a line of the table of findings, and the times of its findings."""
     first = event.findings[0]
     text = events_text(event.findings, system, event.factors())
     text = text if len(event.findings) == 1 else text.removeprefix(_axes_prefix(event))
@@ -358,7 +356,6 @@ def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]
 
 
 def _describe_values(channel: ChannelView, system: System) -> str:
-    """Return the values to use and their uncertainty in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
         unit = choose_page_unit(channel.quantity, symbol, system)

@@ -14,6 +14,7 @@ from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.folder import find_drop_zone, read_failed_pages
 from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import counted, join_names
 from imubench_pipeline.words.verdicts import answer_text
@@ -159,8 +160,7 @@ def list_best_sensors(
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
     marks = {row.sensor: (row.sensor, row.recording) in simulated for row in deciding}
     names = {sensor: sensor + " (simulated)" * mark for sensor, mark in marks.items()}
-    for name in dict.fromkeys(row.requirement for row in deciding):
-        own = [row for row in deciding if row.requirement == name]
+    for name, own in group_rows(deciding, lambda row: row.requirement).items():
         ranked = [row for row in own if row.rank is not None]
         ranked.sort(key=lambda row: (row.rank, -(row.margin or 0.0)))
         excluded = sum(row.verdict == "excluded" for row in own)
@@ -179,7 +179,6 @@ def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:
 
 
 def _bounded(lines: Iterable[str]) -> list[str]:
-    """Return the first lines, and the number of further ones."""
     listed = list(lines)
     more = len(listed) - _MOST_LINES
     return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]
@@ -221,7 +220,6 @@ def count_files(files: Sequence[FileRow]) -> Iterator[str]:
 
 
 def _list_changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:
-    """Yield which files were added to the drop zone, removed or changed since the last run."""
     recordings = find_logs(logs)
     before = {row.file for row in files}
     now = {found.file for found in account_for(logs, recordings)}

@@ -21,6 +21,7 @@ from imubench_pipeline.report.comparison import ComparedRecording, gather_record
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_first_units, list_page_units
 from imubench_pipeline.report.view import Name, RecordingView, gather_recordings
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 
@@ -182,11 +183,8 @@ class Site:
         """
         most = max(_MIN_OF_SENSOR, _MAX_COMPARED // max(1, len({view.sensor for view in views})))
         deciding = {(row.sensor, row.recording) for row in self.rows(RankingRow) if row.decides}
-        by_sensor: dict[str, list[RecordingView]] = {}
-        for view in views:
-            by_sensor.setdefault(view.sensor, []).append(view)
         chosen: set[Name] = set()
-        for own in by_sensor.values():
+        for own in group_rows(views, lambda view: view.sensor).values():
             longest = max(own, key=lambda v: (v.row.decides is not False, v.row.duration or 0.0))
             first = {longest.full_name, *(v.full_name for v in own if v.full_name in deciding)}
             own.sort(key=lambda v: (v.full_name in first, v.row.started or ""), reverse=True)

@@ -399,7 +399,6 @@ class Plan:
         return to_json({"requirements": requirements, "sensors": sensors})
 
     def _for_sale(self) -> dict[str, dict[str, object]]:
-        """Return price class and properties of the sensors that are for sale."""
         return {
             name: about | {"abilities": read_abilities(self.sensors[name]).model_dump(mode="json")}
             for name, about in self._described("price_class").items()
@@ -414,7 +413,6 @@ class Plan:
         }
 
     def _described(self, *keys: str) -> dict[str, dict[str, object]]:
-        """Return keys of the sensor files of the sensors with recordings."""
         used = {sensor for sensor, _ in self.recordings}
         return {
             name: sensor.model_dump(mode="json", include=set(keys))
@@ -528,7 +526,6 @@ def _dump_for_samples(recording: simulations.SimulatedRecording) -> dict[str, An
 
 
 def _describe_board(board: simulations.Board) -> dict[str, object]:
-    """Return the description of a board for the report."""
     return {
         "title": board.title,
         "note": board.note,
@@ -542,7 +539,6 @@ def _describe_board(board: simulations.Board) -> dict[str, object]:
 
 
 def _check_places(run: Run) -> None:
-    """Check that the folders of logs, results and sensor files do not overlap."""
     logs, results = run.logs.resolve(), run.results.resolve()
     declared = (run.sensors,) if isinstance(run.sensors, Path) else run.sensors
     if results in [folder.resolve() for folder in declared]:

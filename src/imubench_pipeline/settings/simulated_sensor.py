@@ -178,7 +178,6 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
 
 
 def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
-    """Return the stated figures in SI, from text and dimension by key."""
     in_si = {}
     for key, (text, dimension) in figures.items():
         if text is not None:

@@ -226,7 +226,6 @@ def name_seal_file(place: str) -> str:
 
 
 def _below(results: Path, paths: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    """Yield the files of paths, each with its path below the results."""
     for path in paths:
         if path.is_relative_to(results):
             inside = path.rglob("*") if path.is_dir() else [path]

@@ -97,7 +97,6 @@ def lay_out(
 
 
 def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
-    """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
     if not sensor.is_file():
         named = list_files(catalogue, "sensor").get(str(sensor))
         if named is None:

@@ -125,7 +125,6 @@ class Results:
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
     def _changed(self, place: str, seal: sealing.Seal) -> Iterator[Fault]:
-        """Yield the changed outputs of a step."""
         left = any(os.path.lexists(self.folder / name) for name in seal.outputs)
         last = place in (f"{sealing.NIGHTS}/latest", f"{sealing.NIGHTS}/state")
         if not (left or last or place in self._current):
@@ -136,7 +135,6 @@ class Results:
             self.read(file.size)
 
     def _samples(self, path: Path) -> Iterator[Fault]:
-        """Yield the changed samples of a recording."""
         place = path.parent.relative_to(self.folder).as_posix()
         step, name = f"{place}/ingest", f"{place}/{path.name}"
         try:
@@ -175,7 +173,6 @@ class Results:
 
     @cached_property
     def _left(self) -> dict[str, sealing.SealedFile]:
-        """Outputs of all steps, by path."""
         return {name: file for seal in self.seals.values() for name, file in seal.outputs.items()}
 
     @cached_property
@@ -192,7 +189,6 @@ class Results:
         return sorted(current)
 
     def _unsealed(self) -> Iterator[Fault]:
-        """Yield the files that no known step has written."""
         for folder in _SEALED_FOLDERS:
             for path in sorted((self.folder / folder).rglob("*")):
                 place = path.relative_to(self.folder)
@@ -210,7 +206,6 @@ class Results:
         return Fault(name, _NO_SEAL, self._removed(name))
 
     def _fault(self, name: str, found: str, place: str) -> Fault:
-        """Return the fault of a file that a step left, and how the file is made again."""
         mend = self._removed(name)
         if place.startswith(f"{sealing.NIGHTS}/"):
             files = (
