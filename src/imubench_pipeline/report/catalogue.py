@@ -189,4 +189,3 @@ DATASHEETS = Entry(
     context=_make_context,
     exists=lambda site: bool(site.rows(CoverageRow)),
 )
-"""The page of all comparisons with datasheets, and of the figures that vendors publish."""

@@ -222,4 +222,3 @@ COMPARE = Entry(
     context=_make_context,
     exists=lambda site: any(view.static for view in site.views),
 )
-"""The page that compares two or more sensors or recordings that the reader chooses."""

@@ -58,10 +58,6 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def _is_wide(interval: str) -> bool:
-    return isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
-
-
 _MAX_DIGITS = 3  # of errors, whose intervals do not include the limits of a class
 _MAX_REASONS = 2  # of an error in a cell; the tables of a run have all
 
@@ -141,7 +137,9 @@ class LimitLine:
     @property
     def parenthesis(self) -> str:
         """The interval in parentheses; empty if it does not differ from the value as printed."""
-        return Markup(" ({})").format(self.interval) if _is_wide(self.interval) else ""
+        interval = self.interval
+        wide = isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
+        return Markup(" ({})").format(interval) if wide else ""
 
 
 @dataclass(frozen=True)
@@ -230,7 +228,6 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
 
 
 ErrorRow = RankingRow | ErrorBudgetRow
-"""A row of an error after a time."""
 
 
 def _expected(row: ErrorRow, system: System) -> str:
@@ -394,12 +391,12 @@ def format_backtest(
             "requirement": requirements.get(row.requirement, {}).get("title") or row.requirement,
             "channel": row.channel.replace("_", " "),
             "error": f"{row.error}, {numbers.duration_text(row.time)}",
-            "window": numbers.duration_text(row.window) if row.window is not None else "–",
-            "measured": "–",
-            "predicted": "–",
-            "ratio": "–",
+            "window": numbers.duration_text(row.window),
+            "measured": numbers.NO_VALUE,
+            "predicted": numbers.NO_VALUE,
+            "ratio": numbers.number_text(row.ratio, 3),
             "range": "",
-            "windows": "–",
+            "windows": numbers.NO_VALUE,
             "verdict": row.verdict,
             "contradicted": row.contradicted,
             "why": row.reason or "",
@@ -408,7 +405,6 @@ def format_backtest(
             line["predicted"] = f"{unit.text(row.predicted)} {unit.sign}"
         if row.ratio is not None:
             line["measured"] = f"{unit.text(row.measured)} {unit.sign}"
-            line["ratio"] = numbers.number_text(row.ratio, 3)
             line["range"] = format_range(row.ratio_lower, row.ratio_upper)
             independent = f"({numbers.number_text(row.independent, 2)} independent)"
             line["windows"] = f"{numbers.number_text(row.windows, 9)} {independent}"

@@ -56,14 +56,14 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 class Arrays:
     """Arrays of a page: each is stored once, as base64 of its codes.
 
-    Code 0 means no value; the others divide the range evenly, or its logarithm. Codes of a
-    logarithm are stored as differences modulo 65536, all low bytes before all high ones.
+    None and NaN are no value, code 0; the others divide the range evenly, or its logarithm. Codes
+    of a logarithm are stored as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
         self._places: dict[Packed, int] = {}
 
-    def exact(self, values: ArrayLike) -> int:
+    def exact(self, values: ArrayLike | Sequence[float | None]) -> int:
         """Store an array as float32; return its index."""
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
@@ -71,7 +71,7 @@ class Arrays:
         """Store positive numbers with a relative error of a few 1e-4; return their index."""
         return self.place(pack_logarithms(values))
 
-    def even(self, values: ArrayLike) -> int:
+    def even(self, values: ArrayLike | Sequence[float | None]) -> int:
         """Store an array for a linear axis in 254 steps; return its index."""
         low, step, codes = _quantise(np.asarray(values, dtype=np.float64), 254)
         return self.place(("e", low, step, codes.astype("<u1").tobytes()))
@@ -285,7 +285,7 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
                     "name": name,
                     "end": envelope[-1].end,
                     **_pack_envelope(envelope, arrays),
-                    "stretch": arrays.even(fill_missing(row.mean for row in stretch)),
+                    "stretch": arrays.even([row.mean for row in stretch]),
                     "stretch_end": stretch[-1].end,
                 }
     return drawn
@@ -293,9 +293,4 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
 
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
     names = ("low", "high", "mean")
-    return {n: arrays.even(fill_missing(getattr(row, n) for row in rows)) for n in names}
-
-
-def fill_missing(values: Iterable[float | None]) -> list[float]:
-    """Return the values of a column; NaN where there is none."""
-    return [np.nan if value is None else value for value in values]
+    return {n: arrays.even([getattr(row, n) for row in rows]) for n in names}

@@ -63,7 +63,6 @@ _SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
 
 _PREFIXED_DIMENSIONS = ("velocity", "length")
 _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
-"""Smallest size in SI for each prefix."""
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:

@@ -194,7 +194,9 @@ def publish(
     }
     for path, content in (_make_assets() | loaded).items():
         written += _put(folder, path, content)
-    every = list(list_pages(site))
+    # Pages of many recordings take longest; the start page is the last.
+    begun = {entry.file for entry in site.existing[1:]}
+    every = sorted(list_pages(site), key=lambda page: page.path not in begun)
     keys = {page.path: page.key for page in every}
     before = _read_keys(folder / KEYS)
     unchanged = {
@@ -215,10 +217,7 @@ def publish(
         rendered = _make_page(site, templates, changed[place]).encode()
         return rendered, site.failed.get(changed[place].path)
 
-    # Pages of many recordings take longest.
-    entries = {entry.file for entry in site.existing}
-    longest = [place for place, page in enumerate(changed) if page.path in entries]
-    made = compute_in_order(make, len(changed), longest, processes)
+    made = compute_in_order(make, len(changed), processes)
     for page, (rendered, failure) in zip(changed, made, strict=True):
         say(page.path)
         if failure is None:

@@ -231,7 +231,6 @@ def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]
     return {
         "number": number,
         "finding": first.finding,
-        "severity": first.severity,
         "matters": event.score() > 0.0 and first.severity != "note",
         "channel": channels_text(event.channels),
         "linked": False,
@@ -263,7 +262,6 @@ def _tabulate_recommended(quantity: str, channels: Sequence[dict[str, Any]]) -> 
 
 
 STATIC = RecordingPage("recording.html.jinja", make_recording_context)
-"""The page of a sensor that was at rest."""
 
 
 def _summarise(view: RecordingView, channels: int) -> str:

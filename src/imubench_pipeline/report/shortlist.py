@@ -60,7 +60,6 @@ SHORTLIST = Entry(
     context=_make_context,
     exists=lambda site: bool(site.rows(ShortlistRow)),
 )
-"""The page of all sensors of the catalogue, for every requirement."""
 
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:

@@ -498,7 +498,6 @@ START = Entry(
     title="Comparison",
     context=_start,
 )
-"""The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
 RECORDINGS = Entry(
     file="recordings.html",
@@ -506,4 +505,3 @@ RECORDINGS = Entry(
     about="every recording with its status, length, rate and warnings",
     context=_recordings,
 )
-"""The page that lists every recording with its state."""

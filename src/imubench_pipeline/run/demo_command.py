@@ -41,7 +41,6 @@ REAL_LOG = RealLog(
     member="scikit_divemove-0.4.0/skdiveMove/tests/data/samsung_galaxy_s5.nc",
     sensor=Path(__file__).with_name("lab") / "galaxy_s5.yaml",
 )
-"""The log of ``--real``."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

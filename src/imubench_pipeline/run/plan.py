@@ -463,15 +463,9 @@ class Plan:
             if path.stem in TABLES and not self.writes_csv(path.stem):
                 path.unlink(missing_ok=True)
 
-    def catalogue(self, *more: str) -> str:
-        """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""
-        return self._sensor_files(self.sensors, more)
-
-    def sensor_file(self, sensor: str, *more: str) -> str:
-        """Return the datasheet of one sensor, in the form of `catalogue`."""
-        return self._sensor_files({sensor} & self.sensors.keys(), more)
-
-    def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
+    def catalogue(self, *more: str, sensor: str | None = None) -> str:
+        """Return the datasheets of all sensors or one, with vendor, model, grade, and more keys."""
+        names = self.sensors if sensor is None else {sensor} & self.sensors.keys()
         keys = {"vendor", "model", "grade", "temperature_range", "datasheet", *more}
         return to_json(
             {

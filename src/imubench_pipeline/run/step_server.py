@@ -93,7 +93,6 @@ def serve(requests: socket.socket) -> None:
 _CHILD_SIGNALS = {signal.SIGCHLD}
 
 _STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
-"""Signals that end a step because the run ends."""
 
 _running: dict[int, tuple["Connection[Any, Any]", str]] = {}  # connection and step of each fork
 

@@ -19,48 +19,62 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
 from imubench_pipeline.settings.validation import Frequency, Strict, Text
 from imubench_pipeline.units import UnitError, add_key_to_errors, parse_difference, parse_quantity
 
+_DIMENSIONS = dict.fromkeys(("B", "amplitude", "bias", "resolution", "full_scale"), "{signal}") | {
+    "N": "{quantity}_density",
+    "T_B": "time",
+    "K": "{quantity}_random_walk",
+    "R": "{quantity}_ramp",
+    "Q": "{quantity}_quantization",
+    "frequency": "frequency",
+    "sensitivity": "{quantity}_temperature_coefficient",
+    "reference": "temperature",
+    "quadratic": "{quantity}_temperature_curvature",
+    "lag": "time",
+}
 
-class ProcessSettings(Strict):
+
+def parse_figure(text: str, name: str, channel: str) -> float:
+    """Return a figure of a channel, or of all channels of a quantity, in SI."""
+    quantity = quantity_of(channel)
+    return parse_quantity(
+        text, _DIMENSIONS[name].format(quantity=quantity, signal=QUANTITIES[quantity])
+    )
+
+
+class Figures(Strict):
+    """Figures with their units."""
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the stated figures of a channel, or of its quantity, in SI; reference in degC."""
+        in_si = {}
+        for name, text in self:
+            if name in _DIMENSIONS and text is not None:
+                with add_key_to_errors(f"{name}: "):
+                    in_si[name] = parse_figure(text, name, channel)
+        return in_si
+
+
+class ProcessSettings(Figures):
     """A Gauss-Markov process."""
 
     B: Text
     T_B: Text
 
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI."""
-        return _in_si({"B": (self.B, QUANTITIES[quantity]), "T_B": (self.T_B, "time")})
 
-
-class LineSettings(Strict):
+class LineSettings(Figures):
     """A sinusoid."""
 
     amplitude: Text
     frequency: Frequency
 
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI."""
-        amplitude = (self.amplitude, QUANTITIES[quantity])
-        return _in_si({"amplitude": amplitude, "frequency": (self.frequency, "frequency")})
 
-
-class DriftSettings(Strict):
+class DriftSettings(Figures):
     """The drift with temperature."""
 
     sensitivity: Text
     reference: Text = "25 degC"
     quadratic: Text | None = None
     lag: Text = "0 s"
-
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI, the reference in degC."""
-        return _in_si(
-            {
-                "sensitivity": (self.sensitivity, f"{quantity}_temperature_coefficient"),
-                "reference": (self.reference, "temperature"),
-                "quadratic": (self.quadratic, f"{quantity}_temperature_curvature"),
-                "lag": (self.lag, "time"),
-            }
-        )
 
 
 class LowPassSettings(Strict):
@@ -70,7 +84,7 @@ class LowPassSettings(Strict):
     order: int = Field(1, ge=1, le=10, description="above 1: Butterworth")
 
 
-class AxisSettings(Strict):
+class AxisSettings(Figures):
     """One axis: its noise (N is two-sided, before the low-pass), and its other errors."""
 
     N: Text | None = Field(None, description="white noise density, two-sided")
@@ -96,36 +110,16 @@ class AxisSettings(Strict):
             raise ValueError("T_B is the correlation time of B, which is missing")
         return self
 
-    def si(self, channel: str) -> dict[str, float]:
-        """Return the figures of noise, bias, resolution and full scale in SI."""
-        quantity = quantity_of(channel)
-        plain = QUANTITIES[quantity]
-        dimensions = {
-            "N": f"{quantity}_density",
-            "B": plain,
-            "T_B": "time",
-            "K": f"{quantity}_random_walk",
-            "R": f"{quantity}_ramp",
-            "Q": f"{quantity}_quantization",
-            "bias": plain,
-            "resolution": plain,
-            "full_scale": plain,
-        }
-        return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
-
     def check(self, channel: str) -> None:
         """Raise UnitError, with the key, if a unit has the wrong dimension for its figure."""
-        quantity = quantity_of(channel)
-        self.si(channel)
-        for number, process in enumerate(self.further):
-            with add_key_to_errors(f"further.{number}."):
-                process.si(quantity)
-        for number, line in enumerate(self.sinusoids):
-            with add_key_to_errors(f"sinusoids.{number}."):
-                line.si(quantity)
+        parts: dict[str, Figures] = {"": self}
+        parts |= {f"further.{number}.": one for number, one in enumerate(self.further)}
+        parts |= {f"sinusoids.{number}.": one for number, one in enumerate(self.sinusoids)}
         if self.drift is not None:
-            with add_key_to_errors("drift."):
-                self.drift.si(quantity)
+            parts["drift."] = self.drift
+        for key, part in parts.items():
+            with add_key_to_errors(key):
+                part.si(channel)
 
 
 def _matrix(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
@@ -175,12 +169,3 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
             axis.check(channel)
         except UnitError as error:
             raise ValueError(f"{key}.{channel}.{error}") from error
-
-
-def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
-    in_si = {}
-    for key, (text, dimension) in figures.items():
-        if text is not None:
-            with add_key_to_errors(f"{key}: "):
-                in_si[key] = parse_quantity(text, dimension)
-    return in_si

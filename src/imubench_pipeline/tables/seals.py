@@ -141,11 +141,6 @@ def name_place(step: str, sensor: str | None = None, recording: str | None = Non
     return f"sensors/{sensor}/{step}" if sensor is not None else step
 
 
-def name_night_place(name: str) -> str:
-    """Return the path of the seal of the results of a nightly run."""
-    return f"{NIGHTS}/{name}"
-
-
 def seal_files(
     results: Path,
     place: str,

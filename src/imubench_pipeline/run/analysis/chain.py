@@ -151,7 +151,7 @@ class Analysis:
             tables = join_tables(
                 own,
                 plan.truths(sensor),
-                plan.sensor_file(sensor, "price_class", "sold"),
+                plan.catalogue("price_class", "sold", sensor=sensor),
                 plan.usual,
                 plan.settings("decide"),
             )
