@@ -29,7 +29,7 @@ def test_the_figures_are_those_of_the_datasheet_and_of_its_class(
         math.radians(0.014) / math.sqrt(2), rel=1e-3
     )
     said = " ".join(text.replace("#", "").split())
-    assert "CAUTION: these are figures of a data sheet and of its class, and not of a log" in said
+    assert "CAUTION: these are figures of a datasheet and of its class, and not of a log" in said
     assert "gyro: B: the printed bias instability is the lowest point" in said
     (accel,) = (part for part in said.split("accel: ") if part.startswith("B: "))
     assert "NOT PRINTED: the worst of its class" in accel

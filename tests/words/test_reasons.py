@@ -194,11 +194,11 @@ EXPORTS = [
 ]
 
 SIMULATIONS = [
-    of(simulations.of_data_sheet, "data sheet of s: sheet 1", "s", "sheet 1"),
-    of(simulations.of_data_sheet, "the data sheet of s", "s", None),
+    of(simulations.of_data_sheet, "datasheet of s: sheet 1", "s", "sheet 1"),
+    of(simulations.of_data_sheet, "the datasheet of s", "s", None),
     of(
         simulations.printed_figure,
-        "N 0.01 dps: typ, data sheet (why)",
+        "N 0.01 dps: typ, datasheet (why)",
         "N",
         0.01,
         "dps",

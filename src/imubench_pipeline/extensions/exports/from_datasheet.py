@@ -11,7 +11,7 @@ from imubench_pipeline.extensions.exports.imu import (
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.units import parse_quantity
 
-_CAUTION = "these are figures of a data sheet and of its class, and not of a log"
+_CAUTION = "these are figures of a datasheet and of its class, and not of a log"
 _NAMES = {
     "N": "N, the two-sided density: a one-sided density over sqrt(2), or the random walk",
     "flicker": "B: the printed bias instability is the lowest point of the curve, 0.664 B",
@@ -69,4 +69,4 @@ def _make_axis(noise: PrintedNoise, document: str) -> AxisNoise:
             )
         else:
             notes.append(f"{meaning}; NOT PRINTED: the worst of its class")
-    return AxisNoise(noise.models["in_use"], f"data sheet {document}", notes)
+    return AxisNoise(noise.models["in_use"], f"datasheet {document}", notes)
