@@ -8,9 +8,8 @@ from imubench_pipeline.extensions.exports.imu import (
     inflate,
     split_axes,
 )
-from imubench_pipeline.extensions.exports.visual_inertial import write_kalibr as write
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from tests.exports.sensors import EACH, GYRO, imu, imu_of_each
+from tests.exports.sensors import EACH, GYRO, imu, imu_of_each, write_text
 
 
 def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
@@ -29,7 +28,9 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
         imu(inflation=1.5)
     with pytest.raises(ExportError, match="needs its reason"):
         imu(inflation=1.5, because=" ")
-    text = write(imu(inflation=1.5, because="vibration in flight")).replace("\n#  ", "")
+    text = write_text("kalibr", imu(inflation=1.5, because="vibration in flight")).replace(
+        "\n#  ", ""
+    )
     assert "1.5 times" in text
     assert "vibration in flight" in text
     assert f"gyroscope_noise_density: {1.5 * GYRO.N:.6e}" in text
@@ -55,12 +56,12 @@ def test_gravity_on_the_ellipsoid() -> None:
 def test_a_program_that_needs_both_says_what_is_missing() -> None:
     alone = Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x"))
     with pytest.raises(ExportError, match="one: no estimate of accel"):
-        write(alone)
+        write_text("kalibr", alone)
 
 
 def test_simulated_recordings_are_called_so() -> None:
-    assert "SIMULATED" in write(imu(simulated=True))
-    assert "SIMULATED" not in write(imu())
+    assert "SIMULATED" in write_text("kalibr", imu(simulated=True))
+    assert "SIMULATED" not in write_text("kalibr", imu())
 
 
 def test_an_inflation_is_of_each_axis() -> None:

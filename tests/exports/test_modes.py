@@ -5,7 +5,6 @@ import math
 import pytest
 import yaml
 
-from imubench_pipeline.extensions.exports import px4
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.modes import (
@@ -16,7 +15,7 @@ from imubench_pipeline.extensions.exports.modes import (
 )
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from tests.exports.sensors import imu_of_each
+from tests.exports.sensors import imu_of_each, write_text
 from tests.exports.test_filters import mavparm
 
 GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
@@ -28,7 +27,7 @@ def test_a_program_that_flies_has_its_defaults_unless_bench_is_asked_for() -> No
     assert choose_mode(None, "px4") == "in-use"
     assert choose_mode("bench", "px4") == "bench"
     assert choose_mode(None, "kalibr") == "bench"
-    text = px4.write(apply_mode(IMU, TARGETS["px4"], choose_mode(None, "px4")))
+    text = write_text("px4", apply_mode(IMU, TARGETS["px4"], choose_mode(None, "px4")))
     values = {
         row.split("\t")[2]: float(row.split("\t")[3])
         for row in text.splitlines()

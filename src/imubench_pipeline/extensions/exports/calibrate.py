@@ -152,7 +152,7 @@ def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
     from imubench_pipeline.report.practical import choose_page_unit
 
     target = TARGETS[options.target]
-    yield f"{options.output.path}: for {target.program}"
+    yield f"{options.output.path}: for {target.title}"
     yield from wrap(imu.mode, _MAX_WIDTH, max_lines=4, placeholder=" ...")
     for quantity, axis in imu.axes.items():
         mapped = map_to_family(axis.model, target.family, imu.horizon, imu.rate)

@@ -84,22 +84,8 @@ def format_comments(statements: Sequence[str], mark: str = "#") -> str:
     return "\n".join(lines) + "\n"
 
 
-def format_python_comments(statements: Sequence[str]) -> str:
-    """Return statements as comments at the top of a file of Python.
-
-    The first line declares the encoding (PEP 263). Without it, Python could take an encoding from
-    the comments, which contain names chosen by users.
-    """
-    return "# -*- coding: utf-8 -*-\n" + format_comments(statements)
-
-
 def _join_lines(statement: str) -> str:
     return escape_invisible(re.sub(r"[\t\n]", " ", statement))
-
-
-def format_setting(key: str, value: str, comment: str, indent: str = "") -> str:
-    """Return a line of YAML with its comment."""
-    return f"{indent}{key}: {value}  # {comment}\n"
 
 
 def format_decimal(value: float) -> str:

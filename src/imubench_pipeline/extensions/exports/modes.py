@@ -15,7 +15,7 @@ from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.mapping import as_walk
-from imubench_pipeline.extensions.exports.targets import Target
+from imubench_pipeline.extensions.exports.programs import Program
 
 Mode = Literal["bench", "bounded", "in-use"]
 
@@ -92,7 +92,7 @@ def choose_mode(mode: Mode | None, target: str) -> Mode:
 
 
 def apply_mode(
-    imu: Imu, target: Target, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
+    imu: Imu, target: Program, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
 ) -> Imu:
     """Return the noise of a sensor for a mode, with the mode in words.
 
@@ -121,7 +121,7 @@ def apply_mode(
         return _raise_to(imu, target, floors, 1.0, words)
     if target.name not in FLOORS:
         raise ExportError(
-            f"nobody recommends noise in use for {target.program}; expected --in-use LOG, a log of "
+            f"nobody recommends noise in use for {target.title}; expected --in-use LOG, a log of "
             "the sensor with motors on or on the way"
         )
     floor = FLOORS[target.name]
@@ -129,7 +129,7 @@ def apply_mode(
     return _raise_to(imu, target, floor.densities(imu.rate), floor.factor, words)
 
 
-def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words: str) -> Imu:
+def _raise_to(imu: Imu, target: Program, floors: Densities, factor: float, words: str) -> Imu:
     """Return the noise raised to densities N and K, or by a factor."""
 
     def raise_axis(axis: AxisNoise | None, quantity: str) -> AxisNoise | None:

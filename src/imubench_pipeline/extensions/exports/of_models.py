@@ -11,7 +11,8 @@ from imubench_pipeline.extensions.exports.imu import (
     compute_normal_gravity,
 )
 from imubench_pipeline.extensions.exports.modes import Mode, apply_mode, choose_mode
-from imubench_pipeline.extensions.exports.targets import TARGETS, Target
+from imubench_pipeline.extensions.exports.programs import Program
+from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables.files import write_content
 from imubench_pipeline.units import parse_setting
@@ -86,14 +87,14 @@ def export(
     return write_file(program, apply_mode(built, program, choose_mode(mode, target)), path)
 
 
-def find_target(target: str) -> Target:
+def find_target(target: str) -> Program:
     """Return a program by its name; ExportError names all if it is not known."""
     if target not in TARGETS:
         raise ExportError(f"target {target!r} is not known; there are: {', '.join(TARGETS)}")
     return TARGETS[target]
 
 
-def write_file(program: Target, imu: Imu, path: str | Path | None) -> str | bytes:
+def write_file(program: Program, imu: Imu, path: str | Path | None) -> str | bytes:
     """Return the file of a program, and write it if there is a path."""
     content = program.write(imu)
     if path is not None:
