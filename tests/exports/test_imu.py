@@ -4,7 +4,6 @@ from imubench_pipeline.extensions.exports.imu import (
     AxisNoise,
     ExportError,
     Imu,
-    compute_normal_gravity,
     inflate,
     split_axes,
 )
@@ -42,15 +41,6 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
 def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ExportError):
         imu(**wrong)  # type: ignore[arg-type]  # wrong on purpose
-
-
-def test_gravity_on_the_ellipsoid() -> None:
-    # TR8350.2, table 3.4: at the equator and at the poles
-    assert compute_normal_gravity(0.0) == pytest.approx(9.7803253359, abs=1e-10)
-    assert compute_normal_gravity(90.0) == pytest.approx(9.8321849378, abs=1e-9)
-    assert compute_normal_gravity(-45.0) == compute_normal_gravity(45.0)
-    with pytest.raises(ExportError, match="latitude"):
-        compute_normal_gravity(91.0)
 
 
 def test_a_program_that_needs_both_says_what_is_missing() -> None:

@@ -12,8 +12,8 @@ import pytest
 import yaml
 from scipy.linalg import expm
 
-from imubench_pipeline.extensions.exports.growth import growth
 from imubench_pipeline.extensions.exports.imu import Imu
+from imubench_pipeline.extensions.exports.overbound import growth
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from tests.exports.sensors import Array, imu, write_text
@@ -211,7 +211,7 @@ def test_the_predicted_covariance_is_the_one_of_simulated_errors(name: str, quan
         P = step(P)
     model = models[quantity]
     assert P[0, 0] == pytest.approx(simulated_variance(model), rel=4.0 * np.sqrt(2.0 / 4000))
-    exact = growth(model, steps * dt, RATE).first[0]
+    exact = growth(model, np.array([steps * dt]), RATE)[0][0]
     assert exact > 2.0 * model.N**2 * SECONDS  # the bias is seen, too
     assert P[0, 0] == pytest.approx(exact, rel=0.01)  # LIO-SAM's key frames: 0.5 %
 

@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.exports.growth import growth
+from imubench_pipeline.extensions.exports.overbound import growth
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from tests.exports.sensors import EACH, Array, imu, imu_of_each, write_text
@@ -56,12 +56,12 @@ def test_gtsam_predicts_the_growth_of_the_errors() -> None:
     covariance = np.diag(found.preintMeasCov())
     for name, angle, bias in (("gyro", 0, 12), ("accel", 6, 9)):
         for axis, model in enumerate(walks(name, 20.0)):
-            expected = growth(model, seconds, 100.0).first[0]
+            expected = growth(model, np.array([seconds]), 100.0)[0][0]
             assert covariance[angle + axis] == pytest.approx(expected, rel=2e-3), (name, axis)
             assert covariance[bias + axis] == pytest.approx(model.K**2 * seconds, rel=1e-5)
     # the position: white noise of the accelerometer, and its walk, integrated twice
     for axis, model in enumerate(walks("accel", 20.0)):
-        expected = growth(model, seconds, 100.0).second[0]
+        expected = growth(model, np.array([seconds]), 100.0)[1][0]
         assert covariance[3 + axis] == pytest.approx(expected, rel=5e-3)
     # the same parameters, without the biases
     alone = gtsam.PreintegratedImuMeasurements(params, gtsam.imuBias.ConstantBias())

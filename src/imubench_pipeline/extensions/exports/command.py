@@ -115,14 +115,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="largest permitted ratio of the Allan deviation of a bound to its limit; default: 3",
     )
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
-    parser.add_argument(
-        "--latitude",
-        type=command_line.make_number_type(
-            -90.0, 90.0, "a latitude of -90 to 90, in degrees", float
-        ),
-        metavar="DEG",
-        help="for gravity",
-    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -214,7 +206,7 @@ def build_from_datasheet(options: argparse.Namespace) -> "Imu":
         if len(found) != 1:
             raise ExportError(f"no sensor {options.datasheet!r}{near}")
         (name,) = found
-    keys = ("horizon", "inflation", "because", "latitude", "rate")
+    keys = ("horizon", "inflation", "because", "rate")
     imu = build_printed_imu(name, found[name], **{key: getattr(options, key) for key in keys})
     measured = None
     if options.in_use not in (None, NOT_MEASURED):

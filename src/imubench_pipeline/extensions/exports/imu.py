@@ -225,20 +225,3 @@ def inflate(model: NoiseModel, factor: float) -> NoiseModel:
     further = [term.scaled(factor) for term in model.further]
     lines = [line.scaled(factor) for line in model.sinusoids]
     return replace(model, **scaled, further=further, sinusoids=lines)
-
-
-def compute_normal_gravity(latitude: float) -> float:
-    """Return gravity on the WGS 84 ellipsoid, m/s^2, at a latitude in degrees; else ExportError.
-
-    Somigliana's formula: NIMA TR8350.2, "Department of Defense World Geodetic System 1984",
-    equation 4-1.
-    """
-    if not abs(latitude) <= 90.0:
-        raise ExportError(f"the latitude is {latitude}, expected degrees from -90 to 90")
-    square = math.sin(math.radians(latitude)) ** 2
-    first_eccentricity_squared = 6.69437999014e-3
-    return (
-        9.7803253359
-        * (1.0 + 1.931852652458e-3 * square)
-        / math.sqrt(1.0 - first_eccentricity_squared * square)
-    )

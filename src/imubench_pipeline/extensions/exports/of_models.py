@@ -3,13 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.extensions.exports.imu import (
-    AxisNoise,
-    ExportError,
-    Imu,
-    compute_normal_gravity,
-)
+from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.modes import Mode, apply_mode, choose_mode
 from imubench_pipeline.extensions.exports.programs import Program
 from imubench_pipeline.extensions.exports.targets import TARGETS
@@ -27,7 +21,6 @@ def export(
     name: str = "sensor",
     mode: Mode | None = None,
     horizon: float | str = 60.0,
-    latitude: float | None = None,
 ) -> str | bytes:
     """Return the input file of a filter or simulator for noise models.
 
@@ -49,8 +42,6 @@ def export(
     horizon : float or str
         Longest time without a measurement, s, for the replacement of terms that the program does
         not support.
-    latitude : float, optional
-        For gravity, degrees.
 
     Returns
     -------
@@ -82,7 +73,6 @@ def export(
         gyro=axes.get("gyro"),
         accel=axes.get("accel"),
         horizon=parse_setting(horizon, "time", "horizon"),
-        gravity=STANDARD_GRAVITY if latitude is None else compute_normal_gravity(latitude),
     )
     return write_file(program, apply_mode(built, program, choose_mode(mode, target)), path)
 

@@ -9,7 +9,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.extensions.exports import imu
 from imubench_pipeline.extensions.exports import reasons as texts
@@ -53,7 +52,6 @@ class Request:
     most_excess: float = MAX_EXCESS
     """Max. ratio of the Allan deviation of an overbound to its limit; a larger one is refused."""
     method: str | None = None  # of estimation; None: the recommended one
-    latitude: float | None = None  # for gravity, degrees; None: standard gravity
     rate: float | None = None  # of the program's samples, Hz; None: the rate of the recording
     ros_topic: str | None = None  # of the samples
     one_device: bool = False  # all recordings are of one device, and are pooled
@@ -141,15 +139,12 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         raise imu.ExportError(
             f"{request.sensor}: no estimate; its recordings are left out: {reasons}"
         )
-    latitude = request.latitude
-    gravity = STANDARD_GRAVITY if latitude is None else imu.compute_normal_gravity(latitude)
     built = imu.Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
         gyro=axes.get("gyro"),
         accel=axes.get("accel"),
         horizon=request.horizon,
-        gravity=gravity,
         inflation=request.inflation,
         because=request.because,
         simulated=simulated,
@@ -239,7 +234,7 @@ def _bound_axis(
             "larger excess"
         ) from error
     fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
-    notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
+    notes = [*bound.words, fitted, *choice.axis.notes]
     if bound.warning:
         notes.insert(0, f"WARNING: {'; '.join([bound.warning, *_list_larger_programs(family)])}")
     return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)
