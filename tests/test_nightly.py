@@ -530,15 +530,14 @@ def test_another_version_is_told_from_another_sensor(tmp_path: Path) -> None:
         "s/a": ("the program changed from version 1.0 to 1.1", False),
         "s/b": ("its log changed", True),
     }
-    assert [(each.recording, each.reanalysed) for each in changes.drift] == [
-        ("a", True), ("b", False)
-    ]  # fmt: skip
+    assert [each.recording for each in changes.drift] == ["a", "b"]
     changes.reanalysis += describe_reanalysis(old, new, {"s/a"})
     text = format_summary(summary(changes))
     assert "changed by the analysis, with the same logs:\n" in text
     assert "Values changed beyond their intervals: 1, by a factor of up to 2\n" in text
     assert "s/a gyro_x N: 0.34 °/√h (0.31 to 0.38), now 0.69 °/√h (0.62 to 0.76) (2 times)" in text
-    assert text.count("the analysis may be the cause") == 1
+    (line,) = (line for line in text.splitlines() if "the analysis may be the cause" in line)
+    assert " in a" in line
 
 
 @pytest.mark.parametrize(

@@ -251,41 +251,6 @@ class Rejected(BaseModel):
     new: bool
 
 
-class Failed(BaseModel):
-    """A step that failed for a recording or a whole sensor, which is omitted."""
-
-    sensor: str
-    recording: str | None
-    step: str
-    cause: str
-    reason: str
-
-
-class NewWarning(BaseModel):
-    """A finding that puts results in doubt."""
-
-    recording: str
-    channel: str | None
-    finding: str
-    detail: str
-
-
-class Drift(BaseModel):
-    """A parameter of a device outside the interval from its earlier recordings."""
-
-    sensor: str
-    device: str
-    channel: str
-    parameter: str
-    recording: str
-    value: float | None
-    expected_lower: float | None
-    expected_upper: float | None
-    unit: str
-    reasons: tuple[str, ...]
-    reanalysed: bool = False  # with the same log, so its value may have changed by the analysis
-
-
 class First(BaseModel):
     """The best sensor for a requirement, if it has changed."""
 
@@ -304,10 +269,10 @@ class Changes(BaseModel):
     new: list[str] = []
     changed: list[Changed] = []
     removed: list[str] = []
-    failed: list[Failed] = []
+    failed: list[FailureRow] = []
     rejected: list[Rejected] = []
-    warnings: list[NewWarning] = []
-    drift: list[Drift] = []
+    warnings: list[FindingRow] = []
+    drift: list[DriftRow] = []
     reanalysis: list[str] = []  # effect of another version, code or settings on the same logs
     first: list[First] = []
 
@@ -348,7 +313,7 @@ def compare_states(
                 )
             )
     failed = [
-        Failed.model_validate(row, from_attributes=True)
+        row
         for row in tables.failures
         if row.recording is None or get_recording_name(row) not in written_to
     ]
@@ -362,7 +327,7 @@ def compare_states(
         if outcome.rejected is not None
     ]
     warnings = [
-        NewWarning.model_validate({**row.columns(), "recording": get_recording_name(row)})
+        row
         for row in select_warnings(tables.findings)
         if get_recording_name(row) not in written_to and make_warning_key(row) not in known_warnings
     ]
@@ -373,7 +338,7 @@ def compare_states(
     ]
     reanalysed = {name for name in changed if was.logs.get(name) == after.logs.get(name)}
     drift = [
-        Drift.model_validate(row.columns() | {"reanalysed": get_recording_name(row) in reanalysed})
+        row
         for key, row in make_drift_keys(tables.drift).items()
         if key.name not in written_to and key not in known_drift
     ]
@@ -443,9 +408,10 @@ def format_summary(summary: Summary) -> str:
     else:
         lines.append(f"recordings, {since}: {counts}")
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
+    reanalysed = {change.recording for change in summary.changed if not change.new_log}
     sections = {
         "failed, omitted in the report, and tried again next time": [
-            *list_failures(FailureRow.from_json(dict(one)) for one in summary.failed)
+            *list_failures(summary.failed)
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
@@ -461,11 +427,14 @@ def format_summary(summary: Summary) -> str:
             for rejection in rejected
         ],
         "new warnings": [
-            f"{warning.recording}: {f'{warning.channel}: ' if warning.channel else ''}"
+            f"{get_recording_name(warning)}: {f'{warning.channel}: ' if warning.channel else ''}"
             f"{warning.finding.replace('_', ' ')}: {warning.detail}"
             for warning in summary.warnings
         ],
-        "devices that have changed": [_describe_drift(drift) for drift in summary.drift],
+        "devices that have changed": [
+            _describe_drift(drift, get_recording_name(drift) in reanalysed)
+            for drift in summary.drift
+        ],
         "first for a requirement": [
             lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
         ],
@@ -480,7 +449,7 @@ def format_summary(summary: Summary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _describe_drift(drift: Drift) -> str:
+def _describe_drift(drift: DriftRow, reanalysed: bool) -> str:
     unit = Unit(drift.unit, 1.0, drift.parameter)
     low, high = drift.expected_lower, drift.expected_upper
     size, limits = unit.estimate_texts(drift.value, low, high)
@@ -490,7 +459,7 @@ def _describe_drift(drift: Drift) -> str:
         f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
         f"{drift.recording}{expected}"
         + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)
-        + "; analysed again with the same log: the analysis may be the cause" * drift.reanalysed
+        + "; analysed again with the same log: the analysis may be the cause" * reanalysed
     )
 
 
