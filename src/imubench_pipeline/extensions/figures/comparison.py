@@ -194,10 +194,8 @@ def draw_forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
     system: System = "practical",
-    symbol: str | Sequence[str] = COMPARED,
 ) -> Figure:
     """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
-    symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = assign_sensor_styles(list(sensors))
     # The height of the row of a sensor grows with its recordings, up to a page in all.
     by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
@@ -217,15 +215,12 @@ def draw_forest_figure(
     total = blocks[-1].bottom
     name = style.name_channel(views[0].channel)
     figure = style.make_figure(
-        style.SINGLE if len(symbols) == 1 else style.DOUBLE,
-        total + _FRAME_HEIGHT,
-        f"{name}: {', '.join(symbols)} of all sensors",
+        style.DOUBLE, total + _FRAME_HEIGHT, f"{name}: {', '.join(COMPARED)} of all sensors"
     )
-    panels = figure.subplots(1, len(symbols), sharey=True, squeeze=False)[0]
+    panels = figure.subplots(1, len(COMPARED), sharey=True)
     kinds: set[str] = set()
-    for panel, each in zip(panels, symbols, strict=True):
-        ticks = 7 if len(symbols) == 1 else 4
-        kinds |= _draw_panel(panel, blocks, looks, each, system, ticks=ticks)
+    for panel, symbol in zip(panels, COMPARED, strict=True):
+        kinds |= _draw_panel(panel, blocks, looks, symbol, system)
     first = panels[0]
     first.set_ylim(total, 0.0)
     first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
@@ -252,8 +247,6 @@ def _draw_panel(
     looks: dict[str, Appearance],
     symbol: str,
     system: System,
-    *,
-    ticks: int,
 ) -> set[str]:
     """Draw one parameter of all sensors; return the kinds of marks that occur."""
     unit = choose_page_unit(blocks[0].views[0].quantity, symbol, system)
@@ -294,14 +287,12 @@ def _draw_panel(
     places, values = zip(*truths, strict=True) if truths else ((), ())
     if truths:
         axes.plot(values, places, marker="|", ms=6.0, mew=0.8, ls="none", color="black", zorder=3.5)
-    _set_limits(axes, drawn, values, unit.per_si, ticks)
+    _set_limits(axes, drawn, values, unit.per_si)
     axes.set_xlabel(f"{style.SYMBOLS[symbol]} ({unit.sign})")
     return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
 
 
-def _set_limits(
-    axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
-) -> None:
+def _set_limits(axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float) -> None:
     """Set axis limits for all values and, within bounds, their intervals."""
     values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
     # The arrow of a limit needs room at its left.
@@ -313,7 +304,7 @@ def _set_limits(
         return
     reach = 10.0**_MAX_INTERVAL_DECADES
     near = np.clip(ends, min(values) / reach, max(values) * reach)
-    style.set_log_axis(axes, "x", style.compute_limits(values, near, margin=1.6), ticks=ticks)
+    style.set_log_axis(axes, "x", style.compute_limits(values, near, margin=1.6), ticks=4)
 
 
 def _draw_marks(
