@@ -15,7 +15,7 @@ libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp (TEMP_REFERENCE, SCALE
 correct_sensor); ArduPilot/pymavlink, mavparm.py (``load``).
 """
 
-from imubench_pipeline.extensions.exports import comments, programs
+from imubench_pipeline.extensions.exports import programs
 from imubench_pipeline.extensions.exports.imu import AXES, Imu, TemperatureEffect
 from imubench_pipeline.extensions.exports.px4 import clip_values
 
@@ -46,8 +46,8 @@ def write(imu: Imu) -> str:
             "temperature; --method compensated leaves it out."
         )
     # Not every program that loads the file reads exponents.
-    rows = [f"{name},{comments.format_decimal(value)}\n" for name, value in values.items()]
-    return comments.format_comments(about) + "".join(rows)
+    rows = [f"{name},{programs.format_decimal(value)}\n" for name, value in values.items()]
+    return programs.format_comments(about) + "".join(rows)
 
 
 def _list_corrections(imu: Imu) -> dict[str, float]:

@@ -27,14 +27,12 @@ _MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; furth
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen axis, of `of` axes, and the Allan deviation of its model at the horizon, SI."""
+    """The chosen axis."""
 
     recording: str
     channel: str
     method: str
     axis: AxisNoise
-    deviation: float
-    of: int
     determined: bool = True  # whether a slow term has a value; else it is only limited from above
     each: Mapping[str, "Choice"] = field(default_factory=dict)
     """The axes x, y and z with an estimate, each chosen among its own."""
@@ -113,7 +111,7 @@ def choose(
                 others["not_median" if axis == MEDIAN else "less_noise"].append(other)
         notes = [*_describe_other_axes(others, horizon), *parameter_notes(estimate, determined)]
         noise = AxisNoise(estimate.model, origin, notes)
-        return Choice(*key, noise, deviation, len(of), determined)
+        return Choice(*key, noise, determined)
 
     each = {
         name[-1]: take([name], "estimate")

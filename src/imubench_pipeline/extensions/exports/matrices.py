@@ -21,10 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from imubench_pipeline.extensions.exports.comments import describe_model
 from imubench_pipeline.extensions.exports.imu import Imu
 from imubench_pipeline.extensions.exports.mapping import describe_terms
-from imubench_pipeline.extensions.exports.programs import Program
+from imubench_pipeline.extensions.exports.programs import Program, describe
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -82,7 +81,7 @@ def compute_matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices
 def write_json(imu: Imu) -> str:
     """Return all matrices as JSON; a quantity without an estimate is absent."""
     content: dict[str, object] = {
-        "about": describe_model(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
+        "about": describe(imu, JSON),
         "sensor": imu.sensor,
         "rate": imu.rate,
         "horizon": imu.horizon,
@@ -119,7 +118,7 @@ def write_npz(imu: Imu) -> bytes:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in _MATRICES:
             arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
-    about = np.array(describe_model(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
+    about = np.array(describe(imu, JSON))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()
@@ -127,7 +126,7 @@ def write_npz(imu: Imu) -> bytes:
 
 JSON = Program(
     name="json",
-    title="any: matrices as JSON",
+    title="any Kalman filter: matrices as JSON",
     file_name="noise.json",
     family="N+GM+K",
     source="https://doi.org/10.1109/TAC.1978.1101743",  # C. Van Loan (1978), the discretisation
@@ -137,7 +136,7 @@ JSON = Program(
 NPZ = replace(
     JSON,
     name="npz",
-    title="any: matrices as NumPy arrays",
+    title="any Kalman filter: matrices as NumPy arrays",
     file_name="noise.npz",
     writer=write_npz,
 )

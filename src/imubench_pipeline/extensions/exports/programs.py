@@ -6,25 +6,26 @@ page "Which numbers go into which filter" lists them.
 
 import json
 import math
+import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from imubench_pipeline.extensions.exports.comments import (
-    describe_model,
-    format_comments,
-    format_decimal,
-)
 from imubench_pipeline.extensions.exports.imu import AXES, AxisNoise, ExportError, Imu, split_axes
 from imubench_pipeline.extensions.exports.mapping import (
     Mapped,
-    as_process,
-    as_walk,
+    describe_terms,
     find_common_time,
+    map_to_family,
 )
 from imubench_pipeline.extensions.exports.overbound import Family
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
+from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.units import convert
+from imubench_pipeline.words.numbers import number_text
+
+_LINE_WIDTH = 96  # of comments
 
 _UNITS = {"gyro": {"x": "rad/s", "dx": "rad/s^2"}, "accel": {"x": "m/s^2", "dx": "m/s^3"}}
 """SI units of a reading and of its rate of change."""
@@ -183,10 +184,7 @@ def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
 
     def map_axis(axis: AxisNoise) -> tuple[Mapped, list[str]]:
         """Return the model for the program, and the words against it."""
-        if program.family == "N+K":
-            one = as_walk(axis.model, imu.horizon, imu.rate)
-        else:
-            one = as_process(axis.model, imu.horizon, imu.rate, time=time)
+        one = map_to_family(axis.model, program.family, imu.horizon, imu.rate, time)
         zeros = [letter for letter in letters if not getattr(one.model, letter) > 0.0]
         return one, [
             f"{letter} is 0, and {program.title} takes values above 0 only" for letter in zeros
@@ -205,13 +203,82 @@ def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
 
 
 def describe(
-    imu: Imu, program: Program, mapped: Mapping[str, Mapped], *, temperature: bool = False
+    imu: Imu,
+    program: Program,
+    mapped: Mapping[str, Mapped] | None = None,
+    *,
+    temperature: bool = False,
 ) -> list[str]:
-    """Return the header of the file of a program (see `comments.describe_model`)."""
-    words = program.convention.format(rate=imu.rate)
-    return describe_model(
-        imu, program.title, words, mapped, temperature=temperature, each=program.each
-    )
+    """Return the header of the file of a program as printable statements.
+
+    `mapped`: the replacements of the models; `temperature`: the file contains the effect on the
+    biases.
+    """
+    statements = [f"Noise of {imu.sensor} for {program.title}, by imubench."]
+    if imu.simulated:
+        statements.append("The recordings are SIMULATED, not measured.")
+    if imu.mode:
+        statements.append(f"{imu.mode}.")
+    statements += [f"CAUTION: {caution}." for caution in imu.cautions]
+    statements.append(program.convention.format(rate=imu.rate))
+    units = {"gyro": "rad, s", "accel": "m, s"}
+    missing = [name for name in units if name not in imu.estimated]
+    statements += [f"{name}: not included, as there is no estimate." for name in missing]
+    described = split_axes(imu.estimated) if program.each else imu.estimated
+    for name, axis in described.items():
+        if name in units and any(f"{name} {letter}" in described for letter in AXES):
+            statements.append(f"{name}: the axes without an estimate have the following noise.")
+        statements.append(f"{name}: {axis.origin}.")
+        terms = describe_terms(axis.model.terms)
+        statements.append(f"{name} model ({units[name.split()[0]]}; N two-sided): {terms}.")
+        statements += [f"{name}: {note}." for note in axis.notes]
+    if temperature:
+        statements += [
+            f"{name} and temperature: {note}."
+            for name, effect in imu.temperature.items()
+            for note in effect.notes
+        ]
+        statements.append(
+            "Fixed biases are not included, as they change from one start to the next."
+        )
+    else:
+        statements.append(
+            "The file contains noise only. Fixed biases change from one start to the next, and "
+            "they and their dependence on temperature are not included."
+        )
+    if imu.inflation != 1.0:
+        statements.append(
+            f"INFLATED: all densities and amplitudes below are {number_text(imu.inflation)} times "
+            f"those above, because: {imu.because or ''}."
+        )
+    printed = [_join_lines(words) for words in statements]
+    replacements = (mapped or {}).items()
+    return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]
+
+
+def format_comments(statements: Sequence[str], mark: str = "#") -> str:
+    """Return statements as comment lines, each beginning with a mark.
+
+    Characters that are not safe in a comment of every format, such as a Unicode line separator in
+    the name of a recording, are escaped. Words longer than a line are divided.
+    """
+    lines = []
+    for statement in statements:
+        wrapped = textwrap.wrap(
+            _join_lines(statement), _LINE_WIDTH - len(mark) - 1, subsequent_indent="  "
+        )
+        lines += [f"{mark} {line}" for line in wrapped]
+    return "\n".join(lines) + "\n"
+
+
+def _join_lines(statement: str) -> str:
+    return escape_invisible(re.sub(r"[\t\n]", " ", statement))
+
+
+def format_decimal(value: float) -> str:
+    """Return a number without an exponent, and with a point."""
+    text = f"{value:.9f}".rstrip("0")
+    return text + "0" if text.endswith(".") else text
 
 
 def compute_values(entry: Entry, imu: Imu, mapped: Mapping[str, Mapped]) -> list[float]:

@@ -29,7 +29,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from imubench_pipeline.extensions.exports import programs
-from imubench_pipeline.extensions.exports.comments import format_comments
 from imubench_pipeline.extensions.exports.imu import AXES, Imu
 from imubench_pipeline.extensions.exports.mapping import Mapped
 
@@ -74,8 +73,8 @@ def write(imu: Imu) -> str:
             f"TC_{letter}_ENABLE is 1. The noise above includes the effect of "
             "temperature; --method compensated leaves it out."
         )
-    columns = "# Vehicle-Id Component-Id Name Value Type\n"
-    return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
+    head = programs.format_comments(["Onboard parameters for Vehicle 1", *about])
+    return head + "# Vehicle-Id Component-Id Name Value Type\n" + "".join(rows)
 
 
 def write_mavparm(imu: Imu) -> str:

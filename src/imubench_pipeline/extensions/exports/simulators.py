@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from imubench_pipeline.extensions.exports import comments, programs
+from imubench_pipeline.extensions.exports import programs
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import (
     AXES,
@@ -124,7 +124,7 @@ def write_matlab(imu: Imu) -> str:
     about = programs.describe(imu, MATLAB, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in coefficients}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
-    text = comments.format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
+    text = programs.format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     members = {"gyro": ("Gyroscope", "gyroparams"), "accel": ("Accelerometer", "accelparams")}
     for name, of_filter in coefficients.items():
@@ -240,8 +240,8 @@ def write_gazebo(imu: Imu) -> str:
             noise += f"              </noise>\n            </{axis}>\n"
         noise += f"          </{element}>\n"
     # Two hyphens would end a comment of XML.
-    words = re.sub("-(?=-)", "- ", comments.format_comments(about))
-    return _SDF.format(about=words, rate=comments.format_decimal(imu.rate), noise=noise)
+    words = re.sub("-(?=-)", "- ", programs.format_comments(about))
+    return _SDF.format(about=words, rate=programs.format_decimal(imu.rate), noise=noise)
 
 
 GAZEBO = programs.declare(
