@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -36,29 +37,6 @@ class StateError(ValueError):
     """Raised for an unreadable state; the message names the consequence."""
 
 
-class Warned(NamedTuple):
-    """Key of a finding, without its size, which may change between runs."""
-
-    recording: str
-    channel: str | None
-    finding: str
-
-
-class Drifted(NamedTuple):
-    """Key of a change of a device."""
-
-    sensor: str
-    device: str
-    channel: str
-    parameter: str
-    recording: str
-
-    @property
-    def name(self) -> str:
-        """Sensor and name of the recording."""
-        return f"{self.sensor}/{self.recording}"
-
-
 class Leader(NamedTuple):
     """The sensor that comes first for a requirement."""
 
@@ -67,10 +45,12 @@ class Leader(NamedTuple):
 
 
 class Known(NamedTuple):
-    """Digest of a recording, and the reason if it was rejected."""
+    """Digest of a recording, and what a run reports once."""
 
     digest: str
-    rejected: str | None = None
+    rejected: str | None = None  # the reason
+    warned: tuple[tuple[str | None, str], ...] = ()  # channel and finding; its size may change
+    drifted: tuple[tuple[str, str, str], ...] = ()  # device, channel and parameter
 
 
 class State(BaseModel):
@@ -81,8 +61,6 @@ class State(BaseModel):
     finished: datetime
     logs: dict[str, Signature] = {}  # that were read
     recordings: dict[str, Known] = {}
-    warned: list[Warned] = []
-    drifted: list[Drifted] = []
     leaders: dict[str, Leader | None] = {}  # by requirement
     skipped: dict[str, datetime] = {}  # since when, without a break
     software: dict[str, str] = {}  # version, and digest of the settings
@@ -91,21 +69,17 @@ class State(BaseModel):
         """Write the state atomically."""
         write_sealed_json(self.model_dump(mode="json"), path)
 
+    def get(self, name: str) -> Known:
+        """Return what is known of a recording, possibly nothing."""
+        return self.recordings.get(name, Known(""))
+
     def without(self, names: Collection[str], before: "State | None") -> "State":
         """Return a state with the previous entries of some recordings, if there were any."""
         was = before or State(finished=self.finished)
         old = {name: was.recordings[name] for name in names if name in was.recordings}
-        others = {name: row for name, row in self.recordings.items() if name not in names}
-        return self.model_copy(
-            update={
-                "logs": {name: log for name, log in self.logs.items() if name not in names},
-                "recordings": others | old,
-                "warned": [warning for warning in self.warned if warning.recording not in names]
-                + [warning for warning in was.warned if warning.recording in names],
-                "drifted": [drift for drift in self.drifted if drift.name not in names]
-                + [drift for drift in was.drifted if drift.name in names],
-            }
-        )
+        others = {name: known for name, known in self.recordings.items() if name not in names}
+        logs = {name: log for name, log in self.logs.items() if name not in names}
+        return self.model_copy(update={"logs": logs, "recordings": others | old})
 
 
 def read_state(path: Path) -> State | None:
@@ -129,7 +103,7 @@ class RunRows:
     fixed_bias: list[FixedBiasRow]
     failures: list[FailureRow]
     findings: list[FindingRow]
-    drift: list[DriftRow]
+    drift: list[DriftRow]  # of devices that have changed
     ranking: list[RankingRow]
     software: Mapping[str, str]
 
@@ -146,7 +120,7 @@ def load_tables(results: Path) -> RunRows:
         fixed_bias=rows(FixedBiasRow),
         failures=rows(FailureRow),
         findings=rows(FindingRow),
-        drift=rows(DriftRow),
+        drift=[row for row in rows(DriftRow) if row.verdict == "changed"],
         ranking=rows(RankingRow),
         software=read_software(results),
     )
@@ -164,6 +138,12 @@ def make_state(
         for row in tables.recordings
         if row.status == "rejected"
     }
+    warned: dict[str, set[tuple[str | None, str]]] = defaultdict(set)
+    for finding in select_warnings(tables.findings):
+        warned[get_recording_name(finding)].add((finding.channel, finding.finding))
+    drifted: dict[str, set[tuple[str, str, str]]] = defaultdict(set)
+    for drift in tables.drift:
+        drifted[get_recording_name(drift)].add((drift.device, drift.channel, drift.parameter))
     # The digest of the rows of a recording changes with its outcome.
     digests = {get_recording_name(row): hashlib.sha256() for row in tables.recordings}
     rows: list[RecordingRow | ParameterRow | FixedBiasRow]
@@ -175,34 +155,23 @@ def make_state(
         finished=finished,
         logs=dict(logs),
         recordings={
-            name: Known(digest.hexdigest()[:16], rejected.get(name))
+            name: Known(
+                digest.hexdigest()[:16],
+                rejected.get(name),
+                tuple(sorted(warned[name], key=str)),
+                tuple(sorted(drifted[name])),
+            )
             for name, digest in digests.items()
         },
-        warned=sorted({make_warning_key(row) for row in select_warnings(tables.findings)}, key=str),
-        drifted=sorted(make_drift_keys(tables.drift)),
         leaders=find_leaders(tables.ranking),
         skipped=dict(skipped),
         software=dict(tables.software),
     )
 
 
-def make_drift_keys(drift: Iterable[DriftRow]) -> dict[Drifted, DriftRow]:
-    """Return the rows of the table ``drift`` about devices that have changed, by their keys."""
-    return {
-        Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording): row
-        for row in drift
-        if row.verdict == "changed"
-    }
-
-
 def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
     """Return sensor and name of the recording of a row."""
     return f"{row.sensor}/{row.recording}"
-
-
-def make_warning_key(row: FindingRow) -> Warned:
-    """Return the key of a finding."""
-    return Warned(get_recording_name(row), row.channel, row.finding)
 
 
 def find_leaders(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
@@ -298,7 +267,6 @@ def compare_states(
     was = before or State(finished=after.finished)
     written_to = set(without)
     now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
-    known_warnings, known_drift = set(was.warned), set(was.drifted)
     first = []
     for name, leader in after.leaders.items():
         old = was.leaders.get(name)
@@ -321,7 +289,7 @@ def compare_states(
         Rejected(
             recording=name,
             reason=outcome.rejected,
-            new=was.recordings.get(name, Known("")).rejected != outcome.rejected,
+            new=was.get(name).rejected != outcome.rejected,
         )
         for name, outcome in now.items()
         if outcome.rejected is not None
@@ -329,7 +297,8 @@ def compare_states(
     warnings = [
         row
         for row in select_warnings(tables.findings)
-        if get_recording_name(row) not in written_to and make_warning_key(row) not in known_warnings
+        if (name := get_recording_name(row)) not in written_to
+        and (row.channel, row.finding) not in was.get(name).warned
     ]
     changed = [
         name
@@ -339,8 +308,9 @@ def compare_states(
     reanalysed = {name for name in changed if was.logs.get(name) == after.logs.get(name)}
     drift = [
         row
-        for key, row in make_drift_keys(tables.drift).items()
-        if key.name not in written_to and key not in known_drift
+        for row in tables.drift
+        if (name := get_recording_name(row)) not in written_to
+        and (row.device, row.channel, row.parameter) not in was.get(name).drifted
     ]
     flagged = warnings or drift or any(rejection.new for rejection in rejected)
     return Changes(
