@@ -18,7 +18,7 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
-    make_marks,
+    make_mark,
 )
 from imubench_pipeline.extensions.figures.curves import (
     CHARACTERISTIC,
@@ -202,8 +202,12 @@ def test_undetermined_term_is_marked_not_determined() -> None:
     assert "rate random walk, K = 6 °/h/√h (not determined)" in written(
         made(draw_terms_figure(view))
     )
-    (mark,) = make_marks(view, "K", 0.0)
-    assert (mark.kind, mark.value, mark.lower) == ("not identified", MODEL.K, MODEL.K / 9)
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value, mark.lower) == (
+        "not identified",
+        MODEL.K,
+        MODEL.K / 9,
+    )
     figure = draw_forest_figure([view], ["imu"])
     (dot,) = [each for each in figure.axes[-1].lines if each.get_marker() == "o"]
     assert dot.get_markerfacecolor() == "white"
@@ -215,9 +219,8 @@ def test_a_channel_without_k() -> None:
     view = view_of(parameters=KNOWN | {"K": Parameter(None, "absent", upper=0.3 * HOUR)})
     (axes,) = made(draw_terms_figure(view)).axes
     assert not [each for each in axes.lines if "random walk, $K$" in str(each.get_label())]
-    assert [(mark.kind, mark.value) for mark in make_marks(view, "K", 0.0)] == [
-        ("limit", 0.3 * HOUR)
-    ]
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value) == ("limit", 0.3 * HOUR)
     assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"]))
     nothing = view_of(parameters=dict.fromkeys(KNOWN, Parameter(None, "absent")))
     found = written(draw_forest_figure([nothing], ["imu"]))

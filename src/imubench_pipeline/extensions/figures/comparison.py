@@ -1,7 +1,7 @@
 """One channel of all sensors: the curves, and the parameters with their intervals."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -150,28 +150,17 @@ class Mark:
     upper: float | None = None
 
 
-def make_marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
-    """Yield a mark for each component of a parameter, within ``spread`` about the place."""
-    if view.recommended not in view.parameters:
-        return
-    rows = view.named(view.recommended, symbol)
-    rows = [row for row in rows if row.value is not None or row.upper]
-    for number, row in enumerate(rows):
-        at = place + spread * ((number + 0.5) / len(rows) - 0.5)
-        lower, upper = row.lower, row.upper
-        if lower is not None and lower < 0.0:
-            # A ramp has a sign, and a logarithmic axis shows its size.
-            if upper is None:
-                lower = None
-            else:
-                lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
+def make_mark(view: ChannelView, symbol: str, place: float) -> Mark | None:
+    """Return the mark of one of the compared parameters at a place, if it has a value or limit."""
+    rows = view.named(view.recommended, symbol) if view.recommended in view.parameters else []
+    for row in rows:
         if row.value is not None:
-            yield Mark(at, "estimate", abs(row.value), lower, upper)
-        elif not lower:
-            yield Mark(at, "limit", upper)
-        else:
-            fitted = None if row.fitted is None else abs(row.fitted)
-            yield Mark(at, "not identified", fitted, lower, upper)
+            return Mark(place, "estimate", row.value, row.lower, row.upper)
+        if row.upper:
+            kind: Kind = "not identified" if row.lower else "limit"
+            value = row.fitted if row.lower else row.upper
+            return Mark(place, kind, value, row.lower, row.upper if row.lower else None)
+    return None
 
 
 @dataclass(frozen=True)
@@ -256,11 +245,11 @@ def _draw_panel(
         if number % 2:
             axes.axhspan(block.top, block.bottom, color="0.955", lw=0, zorder=0.0)
         step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT_HEIGHT
-        of_block = [
-            mark
+        marks = (
+            make_mark(view, symbol, place)
             for view, place in zip(block.views, block.places, strict=True)
-            for mark in make_marks(view, symbol, place, 0.8 * step)
-        ]
+        )
+        of_block = [mark for mark in marks if mark is not None]
         truths += [
             (place, view.truth[symbol].value * unit.per_si)
             for view, place in zip(block.views, block.places, strict=True)
