@@ -30,7 +30,7 @@ from imubench_pipeline.report.run_summary import (
 from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
-from imubench_pipeline.words.numbers import Unit
+from imubench_pipeline.words.numbers import Unit, duration_text
 
 
 class StateError(ValueError):
@@ -368,11 +368,10 @@ def format_summary(summary: Summary) -> str:
         counts += f"; {len(summary.failed)} failed"
     counts += "".join(f"\n{line}" for line in summary.files)
     since = f"since {_format_time(summary.since)}" if summary.since else "the first run"
-    minutes, seconds = divmod(round(summary.seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    took = f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s"
     finished = _format_time(summary.finished)
-    lines = [f"imubench nightly: {summary.outcome}, {finished}, took {took}"]
+    lines = [
+        f"imubench nightly: {summary.outcome}, {finished}, took {duration_text(summary.seconds)}"
+    ]
     if summary.failure:
         lines += ["", "why it failed:", *(f"  {fold_text(line, 500)}" for line in summary.failure)]
     else:
