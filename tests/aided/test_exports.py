@@ -101,8 +101,7 @@ def exported(target: str, models: dict[str, NoiseModel]) -> list[AxisStates]:
     imu = Imu(
         sensor="imu",
         rate=RATE,
-        gyro=AxisNoise(models["gyro"], "a log"),
-        accel=AxisNoise(models["accel"], "a log"),
+        estimated={name: AxisNoise(model, "a log") for name, model in models.items()},
         horizon=HORIZON,
     )
     content = TARGETS[target].write(imu)

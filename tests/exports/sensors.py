@@ -18,8 +18,10 @@ def imu(gyro: NoiseModel = GYRO, accel: NoiseModel = ACCEL, **more: object) -> I
     return Imu(
         sensor="mti_7",
         rate=float(more.pop("rate", RATE)),  # type: ignore[arg-type]  # callers give what the field takes
-        gyro=AxisNoise(gyro, "gyro_z of recording a"),
-        accel=AxisNoise(accel, "accel_x of recording a"),
+        estimated={
+            "gyro": AxisNoise(gyro, "gyro_z of recording a"),
+            "accel": AxisNoise(accel, "accel_x of recording a"),
+        },
         **more,  # type: ignore[arg-type]  # callers give what the field takes
     )
 
@@ -63,4 +65,4 @@ def imu_of_each(**more: object) -> Imu:
     for quantity, models in EACH.items():
         each = {name: AxisNoise(one, f"{quantity} {name} of a") for name, one in models.items()}
         chosen[quantity] = AxisNoise(models["z"], f"{quantity} z of a", each=each)
-    return Imu(sensor="mti_7", rate=100.0, **chosen, **more)  # type: ignore[arg-type]  # as above
+    return Imu(sensor="mti_7", rate=100.0, estimated=chosen, **more)  # type: ignore[arg-type]  # as above

@@ -369,8 +369,8 @@ def test_an_axis_with_a_zero_takes_the_noise_of_the_chosen() -> None:
         "y": AxisNoise(NoiseModel(N=2e-5, K=3e-7), "y"),
     }
     sensor = imu(rate=SAMPLED)
-    assert sensor.gyro
-    sensor = replace(sensor, gyro=replace(sensor.gyro, each=each))
+    gyro = replace(sensor.estimated["gyro"], each=each)
+    sensor = replace(sensor, estimated={**sensor.estimated, "gyro": gyro})
     text = write_text("basalt", sensor)
     values = json.loads(text)["value0"]
     chosen = values["gyro_bias_std"][2]

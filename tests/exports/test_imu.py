@@ -44,7 +44,7 @@ def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
 
 
 def test_a_program_that_needs_both_says_what_is_missing() -> None:
-    alone = Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x"))
+    alone = Imu(sensor="one", rate=100.0, estimated={"gyro": AxisNoise(GYRO, "gyro_x")})
     with pytest.raises(ExportError, match="one: no estimate of accel"):
         write_text("kalibr", alone)
 

@@ -70,7 +70,9 @@ def test_npz_holds_the_same_as_json() -> None:
 
 
 def test_a_sensor_of_one_quantity_and_of_white_noise_alone() -> None:
-    alone = Imu(sensor="one", rate=10.0, accel=AxisNoise(NoiseModel(N=1.0), "accel_x"))
+    alone = Imu(
+        sensor="one", rate=10.0, estimated={"accel": AxisNoise(NoiseModel(N=1.0), "accel_x")}
+    )
     found = json.loads(matrices.write_json(alone))
     assert "gyro" not in found
     assert found["accel"]["discrete"]["Phi"] == []

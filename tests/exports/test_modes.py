@@ -20,7 +20,7 @@ from tests.exports.test_filters import mavparm
 
 GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
 ACCEL = AxisNoise(NoiseModel(N=1e-3, K=2e-5), "accel x of bench")
-IMU = Imu(sensor="mine", rate=200.0, gyro=GYRO, accel=ACCEL)
+IMU = Imu(sensor="mine", rate=200.0, estimated={"gyro": GYRO, "accel": ACCEL})
 
 
 def test_a_program_that_flies_has_its_defaults_unless_bench_is_asked_for() -> None:
@@ -59,8 +59,7 @@ def test_ardupilot_has_the_defaults_of_ekf3() -> None:
 def test_the_noise_of_each_axis_is_raised() -> None:
     measured = {"gyro_x": InUseNoise(4e-5, 0.1, 10.0, [])}
     raised = apply_mode(imu_of_each(), TARGETS["gazebo"], "in-use", measured)
-    assert raised.gyro
-    N = {axis: one.model.N for axis, one in raised.gyro.each.items()}
+    N = {axis: one.model.N for axis, one in raised.estimated["gyro"].each.items()}
     assert N == pytest.approx({"x": 4e-5, "z": 5e-5})  # at rest 3e-5 and 5e-5
 
 
@@ -103,10 +102,9 @@ def test_the_noise_of_a_log_in_use_never_lowers_the_noise_at_rest(
         "gyro_y": InUseNoise(noise, 0.1, 10.0, [(50.0, 0.2)]),
     }
     raised = apply_mode(IMU, TARGETS["json"], "in-use", measured)
-    assert raised.gyro is not None and raised.accel is not None
-    assert raised.gyro.model.N == pytest.approx(expected)
-    assert raised.gyro.model.B == GYRO.model.B  # what is slow is not seen in motion
-    assert raised.accel.model.terms == ACCEL.model.terms
+    assert raised.estimated["gyro"].model.N == pytest.approx(expected)
+    assert raised.estimated["gyro"].model.B == GYRO.model.B  # what is slow is not seen in motion
+    assert raised.estimated["accel"].model.terms == ACCEL.model.terms
     assert f"lines at 50 Hz ({number(0.2)} °/s rms)" in raised.mode
     assert "Below 10 Hz all is taken as motion" in raised.mode
     assert ("no more noise than the log at rest" in raised.mode) == (noise < 1e-4)

@@ -154,8 +154,7 @@ def sensor(model: NoiseModel, said: str) -> Imu:
     return Imu(
         sensor=said,
         rate=100.0,
-        gyro=axis,
-        accel=axis,
+        estimated={"gyro": axis, "accel": axis},
         inflation=1.5,
         because=f"it flies {said}",
         horizon=10.0,

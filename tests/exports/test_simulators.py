@@ -131,7 +131,9 @@ def test_matlab_without_poles_enough_takes_the_nearest_process() -> None:
 
 
 def test_matlab_takes_one_quantity_alone() -> None:
-    text = write_text("matlab", Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x")))
+    text = write_text(
+        "matlab", Imu(sensor="one", rate=100.0, estimated={"gyro": AxisNoise(GYRO, "gyro_x")})
+    )
     assert "IMU.Gyroscope" in text
     assert "IMU.Accelerometer" not in text
 
@@ -206,8 +208,8 @@ def test_each_axis_is_simulated_with_its_own_noise() -> None:
 
 def test_an_overbound_is_of_the_chosen_axis_for_all() -> None:
     sensor = imu_of_each()
-    assert sensor.gyro
-    bounded = replace(sensor, gyro=replace(sensor.gyro, bounded=(0.01, 1.0)))
+    gyro = replace(sensor.estimated["gyro"], bounded=(0.01, 1.0))
+    bounded = replace(sensor, estimated={**sensor.estimated, "gyro": gyro})
     found = gazebo_noise(write_text("gazebo", bounded))
     assert len({found[f"angular_velocity/{axis}"]["stddev"] for axis in "xyz"}) == 1
 
@@ -216,7 +218,7 @@ def test_axes_with_other_correlation_times_share_one_filter_in_matlab() -> None:
     times = {"x": 20.0, "y": 60.0, "z": 90.0}
     models = {axis: NoiseModel(N=1e-5, B=4e-5, T_B=T) for axis, T in times.items()}
     each = {axis: AxisNoise(model, axis) for axis, model in models.items()}
-    sensor = Imu(sensor="s", rate=RATE, gyro=AxisNoise(models["z"], "z", each=each))
+    sensor = Imu(sensor="s", rate=RATE, estimated={"gyro": AxisNoise(models["z"], "z", each=each)})
     text = write_text("matlab", sensor)
     pole = float(re.search(r"'Denominator', \[1, -([^\]]+)\]", text)[1])  # type: ignore[index]  # or fails
     T_B = -1.0 / (RATE * np.log(pole))

@@ -39,8 +39,7 @@ def build_printed_imu(
     return Imu(
         sensor=f"{sensor.vendor} {sensor.model}",
         rate=rate or parse_quantity(sensor.rate or "", "frequency"),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=horizon,
         inflation=inflation,
         because=because,

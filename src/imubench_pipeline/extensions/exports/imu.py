@@ -171,8 +171,7 @@ class Imu:
 
     sensor: str
     rate: float  # of the samples that the program will get, Hz
-    gyro: AxisNoise | None = None  # None: no estimate
-    accel: AxisNoise | None = None
+    estimated: Mapping[str, AxisNoise]  # gyro, accel, or both, without the inflation
     horizon: float = 60.0
     """Longest time that the program predicts without a measurement, s. A replacement for a model
     that the program does not support has the same Allan variance at this time."""
@@ -202,12 +201,6 @@ class Imu:
     def axes(self) -> dict[str, AxisNoise]:
         """The quantities that have an estimate, with the inflation in their models."""
         return {name: axis.inflated(self.inflation) for name, axis in self.estimated.items()}
-
-    @property
-    def estimated(self) -> dict[str, AxisNoise]:
-        """The quantities that have an estimate, without the inflation."""
-        both = {"gyro": self.gyro, "accel": self.accel}
-        return {name: axis for name, axis in both.items() if axis is not None}
 
     def require_both(self) -> None:
         """Raise ExportError if there is no estimate of gyro or accelerometer."""

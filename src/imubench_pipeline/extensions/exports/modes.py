@@ -132,9 +132,7 @@ def apply_mode(
 def _raise_to(imu: Imu, target: Program, floors: Densities, factor: float, words: str) -> Imu:
     """Return the noise raised to densities N and K, or by a factor."""
 
-    def raise_axis(axis: AxisNoise | None, quantity: str) -> AxisNoise | None:
-        if axis is None:
-            return None
+    def raise_axis(axis: AxisNoise, quantity: str) -> AxisNoise:
         least_N, least_K = floors.get(quantity, (0.0, 0.0))
         model = inflate(axis.model, factor)
         notes = list(axis.notes)
@@ -144,10 +142,9 @@ def _raise_to(imu: Imu, target: Program, floors: Densities, factor: float, words
             notes += mapped.words
         model = replace(model, N=max(model.N, least_N))
         notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
-        raised = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
-        each = {letter: one for letter, one in raised.items() if one is not None}
+        each = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
         limited = axis.slow_limited and model.K == axis.model.K
         return replace(axis, model=model, notes=notes, each=each, slow_limited=limited)
 
-    gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
-    return replace(imu, gyro=gyro, accel=accel, mode=words)
+    raised = {name: raise_axis(axis, name) for name, axis in imu.estimated.items()}
+    return replace(imu, estimated=raised, mode=words)

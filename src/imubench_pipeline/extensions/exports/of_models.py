@@ -66,12 +66,13 @@ def export(
     if mode == "bounded":
         raise ValueError("a bound needs a log: expected Estimates.export")
     program = find_target(target)
-    axes = {key: AxisNoise(model, "a given model") for key, model in models.items()}
+    axes = {
+        key: AxisNoise(models[key], "a given model") for key in ("gyro", "accel") if key in models
+    }
     built = Imu(
         sensor=name,
         rate=parse_setting(rate, "frequency", "rate"),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=parse_setting(horizon, "time", "horizon"),
     )
     return write_file(program, apply_mode(built, program, choose_mode(mode, target)), path)

@@ -122,11 +122,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
         every = (choice, *choice.each.values())
         if mode == "bounded":
-            curves = (_find_curve(tables, request.sensor, one) for one in every)
-            chosen, *own = (
-                _bound_axis(curve, one, request, about.rate, folder)
-                for curve, one in zip(curves, every, strict=True)
-            )
+            chosen, *own = (_bound_axis(tables, request, one, about.rate, folder) for one in every)
             largest = {
                 name: max(getattr(one.model, name) for one in (chosen, *own)) for name in "NK"
             }  # one number for all axes is above each of them
@@ -142,8 +138,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
     built = imu.Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=request.horizon,
         inflation=request.inflation,
         because=request.because,
@@ -206,7 +201,7 @@ def _limit_walk(axis: imu.AxisNoise, curve: AllanCurve, horizon: float) -> imu.A
 
 
 def _bound_axis(
-    curve: AllanCurve, choice: Choice, request: Request, rate: float, folder: Path | None
+    tables: Tables, request: Request, choice: Choice, rate: float, folder: Path | None
 ) -> imu.AxisNoise:
     """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
@@ -217,7 +212,7 @@ def _bound_axis(
             drawn = read_draws(path).get((choice.channel, choice.method))
     try:
         bound = overbound(
-            curve,
+            _find_curve(tables, request.sensor, choice),
             choice.axis.model,
             rate,
             family=family,
