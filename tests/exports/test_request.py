@@ -215,7 +215,6 @@ def test_an_overbound_lies_above_the_draws_of_the_recording(
         tables, replace(REQUEST, mode="bounded", horizon=600.0, most_excess=20.0)
     ).estimated["gyro"]
     # Sure of the fit, only the measured curve is widened; else the bound is as much larger.
-    assert without is not None
     sure, unsure = bounded(1.001), bounded(2.0)
     assert sure.K < without.model.K < unsure.K
     assert 2e-4 < sure.N < 2e-4 * 1.1 < 2e-4 * 1.7 < unsure.N < 2e-4 * 2.3

@@ -37,13 +37,6 @@ class StateError(ValueError):
     """Raised for an unreadable state; the message names the consequence."""
 
 
-class Leader(NamedTuple):
-    """The sensor that comes first for a requirement."""
-
-    sensor: str
-    fulfils: bool
-
-
 class Known(NamedTuple):
     """Digest of a recording, and what a run reports once."""
 
@@ -61,7 +54,7 @@ class State(BaseModel):
     finished: datetime
     logs: dict[str, Signature] = {}  # that were read
     recordings: dict[str, Known] = {}
-    leaders: dict[str, Leader | None] = {}  # by requirement
+    answers: list[str] = []  # the best sensor of each requirement, in words
     skipped: dict[str, datetime] = {}  # since when, without a break
     software: dict[str, str] = {}  # version, and digest of the settings
 
@@ -163,7 +156,7 @@ def make_state(
             )
             for name, digest in digests.items()
         },
-        leaders=find_leaders(tables.ranking),
+        answers=[*list_best_sensors(tables.ranking, tables.recordings)],
         skipped=dict(skipped),
         software=dict(tables.software),
     )
@@ -172,21 +165,6 @@ def make_state(
 def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
     """Return sensor and name of the recording of a row."""
     return f"{row.sensor}/{row.recording}"
-
-
-def find_leaders(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
-    """Return the best sensor for each requirement; None if no sensor can be ranked."""
-    first: dict[str, Leader | None] = {}
-    margins: dict[str, float] = {}
-    for row in ranking:
-        if row.decides:
-            name = row.requirement
-            first.setdefault(name, None)
-            margin = row.margin or 0.0
-            if row.rank == 1 and (name not in margins or margin > margins[name]):
-                first[name] = Leader(row.sensor, row.verdict not in ("likely_fails", "fails"))
-                margins[name] = margin
-    return first
 
 
 Outcome = Literal["fine", "flagged", "failed"]
@@ -220,15 +198,6 @@ class Rejected(BaseModel):
     new: bool
 
 
-class First(BaseModel):
-    """The best sensor for a requirement, if it has changed."""
-
-    requirement: str
-    sensor: str | None
-    before: str | None
-    said: str
-
-
 class Changes(BaseModel):
     """Changes since the last successful nightly run; without one that was read: failed."""
 
@@ -243,7 +212,7 @@ class Changes(BaseModel):
     warnings: list[FindingRow] = []
     drift: list[DriftRow] = []
     reanalysis: list[str] = []  # effect of another version, code or settings on the same logs
-    first: list[First] = []
+    answers: list[str] = []  # the best sensor of each requirement whose answer has changed
 
 
 class Summary(Changes):
@@ -267,19 +236,6 @@ def compare_states(
     was = before or State(finished=after.finished)
     written_to = set(without)
     now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
-    first = []
-    for name, leader in after.leaders.items():
-        old = was.leaders.get(name)
-        if name not in was.leaders or leader != old:
-            of_it = [row for row in tables.ranking if row.requirement == name]
-            first.append(
-                First(
-                    requirement=name,
-                    sensor=leader and leader.sensor,
-                    before=old and f"{old.sensor}{', which failed it' * (not old.fulfils)}",
-                    said=next(list_best_sensors(of_it, tables.recordings)),
-                )
-            )
     failed = [
         row
         for row in tables.failures
@@ -333,7 +289,7 @@ def compare_states(
         rejected=rejected,
         warnings=warnings,
         drift=drift,
-        first=first,
+        answers=[answer for answer in after.answers if answer not in was.answers],
     )
 
 
@@ -404,9 +360,7 @@ def format_summary(summary: Summary) -> str:
             _describe_drift(drift, get_recording_name(drift) in reanalysed)
             for drift in summary.drift
         ],
-        "first for a requirement": [
-            lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
-        ],
+        "other answers to a requirement": summary.answers,
         "repaired after an earlier run": summary.put_right,
     }
     for title, entries in sections.items():
