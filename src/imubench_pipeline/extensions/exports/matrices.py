@@ -118,7 +118,7 @@ def write_npz(imu: Imu) -> bytes:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in _MATRICES:
             arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
-    about = np.array(describe(imu, JSON))
+    about = np.array(describe(imu, NPZ))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()
