@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
@@ -66,7 +67,7 @@ def densities(found: dict[str, float], rate: float) -> dict[str, Recursion]:
 
 def from_vins(sensor: Imu) -> dict[str, Recursion]:
     found = opencv(write_text("vins-fusion", sensor))
-    assert found["g_norm"] == sensor.gravity
+    assert found["g_norm"] == STANDARD_GRAVITY
     return {
         name: (midpoint, found[f"{word}_n"], found[f"{word}_w"] / sensor.rate, sensor.rate)
         for name, word in (("gyro", "gyr"), ("accel", "acc"))
@@ -141,7 +142,7 @@ def from_ardupilot(sensor: Imu) -> dict[str, Recursion]:
 
 def from_lio_sam(sensor: Imu) -> dict[str, Recursion]:
     found = yaml.safe_load(write_text("lio-sam", sensor))["lio_sam"]
-    assert found["imuGravity"] == sensor.gravity
+    assert found["imuGravity"] == STANDARD_GRAVITY
     root = np.sqrt(sensor.rate)
     return {
         name: (

@@ -36,7 +36,7 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"rate": 0.0}, {"horizon": -1.0}, {"gravity": float("nan")}, {"horizon": 0.03}]
+    "wrong", [{"rate": 0.0}, {"horizon": -1.0}, {"inflation": float("nan")}, {"horizon": 0.03}]
 )
 def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ExportError):

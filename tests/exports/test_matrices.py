@@ -28,19 +28,20 @@ def discretised(F: Array, Q: Array, interval: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("model", [GYRO, EVERYTHING, NoiseModel(N=1e-4, B=1e-4)])
 def test_the_discrete_model_is_the_continuous_one_sampled(model: NoiseModel) -> None:
-    found = matrices.compute_matrices(model, 20.0, 30.0)
-    phi, drive = discretised(found.F, found.Q, 0.05)
-    np.testing.assert_allclose(found.Phi, phi, atol=1e-12)
-    np.testing.assert_allclose(found.Q_d, drive, rtol=1e-6, atol=1e-18)
-    np.testing.assert_array_equal(found.H, found.H_continuous)
-    assert found.R_d == pytest.approx(found.R * 20.0)
-    assert len(found.states) == len(found.H) == len(found.x0)
+    continuous, discrete, states = matrices.compute_matrices(model, 20.0, 30.0)
+    phi, drive = discretised(continuous["F"], continuous["Q"], 0.05)
+    np.testing.assert_allclose(discrete["Phi"], phi, atol=1e-12)
+    np.testing.assert_allclose(discrete["Q_d"], drive, rtol=1e-6, atol=1e-18)
+    np.testing.assert_array_equal(discrete["H"], continuous["H"])
+    assert discrete["R_d"] == pytest.approx(continuous["R"] * 20.0)
+    assert len(states) == len(discrete["H"]) == len(discrete["x0"])
 
 
 def test_quantization_noise_is_in_the_discrete_model_alone() -> None:
-    found = matrices.compute_matrices(NoiseModel(Q=1e-6, N=1e-4, K=1e-6), 20.0, 30.0)
-    assert found.F.shape == (1, 1)
-    assert found.Phi.shape == (3, 3)
+    model = NoiseModel(Q=1e-6, N=1e-4, K=1e-6)
+    continuous, discrete, _ = matrices.compute_matrices(model, 20.0, 30.0)
+    assert continuous["F"].shape == (1, 1)
+    assert discrete["Phi"].shape == (3, 3)
 
 
 def test_json_holds_the_matrices_to_the_last_bit() -> None:

@@ -24,7 +24,7 @@ import numpy as np
 def make_params(z_up=True):
     """Return the parameters for a navigation frame with z up (ENU) or down (NED)."""
     kind = gtsam.PreintegrationCombinedParams
-    params = (kind.MakeSharedU if z_up else kind.MakeSharedD)({imu.gravity!r})  # m/s^2
+    params = (kind.MakeSharedU if z_up else kind.MakeSharedD)({gravity})  # m/s^2
 {lines}    params.setIntegrationCovariance(1e-7**2 * np.eye(3))  # of GTSAM's examples
     if hasattr(params, "setBiasAccOmegaInit"):
         params.setBiasAccOmegaInit(np.zeros((6, 6)))  # it acts as white noise
@@ -61,7 +61,7 @@ CERES = programs.declare(
     # The empty line: a comment that ends with a backslash goes on in the next line.
     layout="{head}\n#pragma once\n\nnamespace imu_noise {{\n"
     "inline constexpr double kRate = {imu.rate!r};  // Hz\n"
-    "inline constexpr double kGravity = {imu.gravity!r};  // m/s^2\n"
+    "inline constexpr double kGravity = {gravity};  // m/s^2\n"
     "{lines}}}  // namespace imu_noise\n",
 )
 """A header of C++ 17 for preintegration that is optimised by Ceres.

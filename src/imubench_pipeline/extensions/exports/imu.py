@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
@@ -175,7 +174,6 @@ class Imu:
     horizon: float = 60.0
     """Longest time that the program predicts without a measurement, s. A replacement for a model
     that the program does not support has the same Allan variance at this time."""
-    gravity: float = STANDARD_GRAVITY  # m/s^2
     inflation: float = 1.0  # factor on all densities and amplitudes, not on variances
     because: str | None = None
     """Reason of the inflation, or of the use of a recording that is excluded from decisions."""
@@ -186,7 +184,7 @@ class Imu:
     ros_topic: str = "/imu0"  # of the samples
 
     def __post_init__(self) -> None:
-        for name in ("rate", "horizon", "gravity", "inflation"):
+        for name in ("rate", "horizon", "inflation"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ExportError(f"{name} is {value}, expected a number above 0")

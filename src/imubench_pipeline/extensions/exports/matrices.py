@@ -15,12 +15,12 @@ with mean x0 and covariance P0 of the first x. Quantization noise has no continu
 
 import io
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports.imu import Imu
 from imubench_pipeline.extensions.exports.mapping import describe_terms
 from imubench_pipeline.extensions.exports.programs import Program, describe
@@ -30,7 +30,6 @@ from imubench_pipeline.typing import Array
 FLICKER_TAU_OVER_HORIZON = 4.0
 """Longest tau of the approximation of flicker noise, over the horizon."""
 
-_MATRICES = ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0")
 _CONVENTION = (
     "SI; densities are two-sided. Continuous: x' = F x + w, z = H x + v with densities Q and R of "
     "w and v. Discrete at {rate:g} Hz: Phi, Q_d, H, R_d, exact; x0 and P0: mean and covariance of "
@@ -38,44 +37,41 @@ _CONVENTION = (
 )
 
 
-@dataclass(frozen=True)
-class Matrices:
-    """A noise model in continuous and discrete time; m states."""
-
-    F: Array  # shape (m, m); continuous in time, without the states of quantization noise
-    Q: Array  # shape (m, m)
-    H_continuous: Array  # shape (m,)
-    R: float  # density of the white noise, N^2
-    Phi: Array  # shape (m, m)
-    Q_d: Array  # shape (m, m)
-    H: Array  # shape (m,)
-    R_d: float
-    x0: Array  # shape (m,)
-    P0: Array  # shape (m, m)
-    states: Sequence[str]  # term of each state of the discrete model
+Matrices = dict[str, Array]
 
 
-def compute_matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
-    """Return the matrices of a model at a rate, Hz; flicker noise up to four times `horizon`, s."""
+def compute_matrices(
+    model: NoiseModel, rate: float, horizon: float
+) -> tuple[Matrices, Matrices, list[str]]:
+    """Return a model in continuous and in discrete time, and the term of each discrete state.
+
+    The rate is in Hz; flicker noise is approximated up to four times `horizon`, s. Of m continuous
+    states, without the states of quantization noise: F and Q, shape (m, m), H, shape (m,), and the
+    density R of the white noise. Of n discrete states: Phi, Q_d and P0, shape (n, n), H and x0,
+    shape (n,), and the variance R_d.
+    """
     longest = max(FLICKER_TAU_OVER_HORIZON * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
-    discrete = model.state_space(rate, longest)
-    spaces = [term.continuous_space() for term in terms]
-    continuous = [space for space in spaces if space is not None]
+    spaces = [space for term in terms if (space := term.continuous_space()) is not None]
+    white = sum(term.drive.white for term in terms if term.drive is not None and term.drive.white)
     nothing = np.zeros((0, 0))
-    return Matrices(
-        F=block_diag(nothing, *(space.transition for space in continuous)),
-        Q=block_diag(nothing, *(space.density for space in continuous)),
-        H_continuous=np.concatenate([np.zeros(0), *(space.output for space in continuous)]),
-        R=sum(term.drive.white for term in terms if term.drive is not None and term.drive.white),
-        Phi=discrete.transition,
-        Q_d=discrete.process_noise,
-        H=discrete.output,
-        R_d=discrete.measurement_noise,
-        x0=discrete.initial_mean,
-        P0=discrete.initial_variance,
-        states=[describe_terms([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
-    )
+    continuous = {
+        "F": block_diag(nothing, *(space.transition for space in spaces)),
+        "Q": block_diag(nothing, *(space.density for space in spaces)),
+        "H": np.concatenate([np.zeros(0), *(space.output for space in spaces)]),
+        "R": np.asarray(white),
+    }
+    sampled = model.state_space(rate, longest)
+    discrete = {
+        "Phi": sampled.transition,
+        "Q_d": sampled.process_noise,
+        "H": sampled.output,
+        "R_d": np.asarray(sampled.measurement_noise),
+        "x0": sampled.initial_mean,
+        "P0": sampled.initial_variance,
+    }
+    states = [describe_terms([t]) for t in terms for _ in t.state_space(1.0 / rate).output]
+    return continuous, discrete, states
 
 
 def write_json(imu: Imu) -> str:
@@ -85,14 +81,12 @@ def write_json(imu: Imu) -> str:
         "sensor": imu.sensor,
         "rate": imu.rate,
         "horizon": imu.horizon,
-        "gravity": imu.gravity,
+        "gravity": STANDARD_GRAVITY,
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
         model = axis.model
-        of_axis = compute_matrices(model, imu.rate, imu.horizon)
-        lists = [np.asarray(getattr(of_axis, key)).tolist() for key in _MATRICES]
-        F, Q, H_continuous, R, Phi, Q_d, H, R_d, x0, P0 = lists
+        continuous, discrete, states = compute_matrices(model, imu.rate, imu.horizon)
         content[name] = {
             "model": model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
@@ -102,9 +96,9 @@ def write_json(imu: Imu) -> str:
                 "sinusoids": [line.values for line in model.sinusoids],
             },
             "density_bounded": list(axis.bounded) if axis.bounded else None,
-            "states": list(of_axis.states),
-            "continuous": {"F": F, "Q": Q, "H": H_continuous, "R": R},
-            "discrete": {"Phi": Phi, "Q_d": Q_d, "H": H, "R_d": R_d, "x0": x0, "P0": P0},
+            "states": states,
+            "continuous": {key: matrix.tolist() for key, matrix in continuous.items()},
+            "discrete": {key: matrix.tolist() for key, matrix in discrete.items()},
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
@@ -113,11 +107,11 @@ def write_npz(imu: Imu) -> bytes:
     """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``."""
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
-        of_axis = compute_matrices(axis.model, imu.rate, imu.horizon)
+        continuous, discrete, _ = compute_matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
-        for key in _MATRICES:
-            arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
+        continuous["H_continuous"] = continuous.pop("H")
+        arrays |= {f"{name}_{key}": array for key, array in (continuous | discrete).items()}
     about = np.array(describe(imu, NPZ))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports.imu import AXES, AxisNoise, ExportError, Imu, split_axes
 from imubench_pipeline.extensions.exports.mapping import (
     Mapped,
@@ -326,6 +327,6 @@ def fill_layout(
         **numbers,
         imu=imu,
         rate=format_decimal(imu.rate),
-        gravity=format_decimal(imu.gravity),
+        gravity=format_decimal(STANDARD_GRAVITY),
         topic=json.dumps(imu.ros_topic),
     )
