@@ -38,7 +38,7 @@ def test_the_bound_is_that_of_all_blocks_and_of_the_filter(bias: float) -> None:
 def test_of_white_noise_sigma_goes_as_its_density() -> None:
     model = NoiseModel(N=2e-4)
     drawn = [NoiseModel(N=2e-4 * factor) for factor in np.linspace(0.8, 1.2, 41)]
-    for method, found in compute_sigma_ranges(BLOCKS, model, drawn, None).items():
+    for method, found in compute_sigma_ranges(BLOCKS, drawn, None).items():
         sigma = compute_final_bound(BLOCKS, model)
         if method in ("filter", "smoother"):
             assert found["sigma_lower"] == pytest.approx(0.81 * sigma, rel=1e-6)
@@ -48,9 +48,9 @@ def test_of_white_noise_sigma_goes_as_its_density() -> None:
 
 def test_two_dwells_have_no_triples() -> None:
     two = Experiment.regular(dwell=28.0, turning=2.0, dwells=2, rate=32.0, latitude=0.4)
-    found = compute_sigma_ranges(two.blocks(224), PAPER, [PAPER], None)
+    found = compute_sigma_ranges(two.blocks(224), [PAPER], None)
     assert set(found) == {"pairs", "filter", "smoother"}
-    assert compute_sigma_ranges(BLOCKS, PAPER, [], None) == {}
+    assert compute_sigma_ranges(BLOCKS, [], None) == {}
 
 
 def put_with_limits(folder: Path, spread: float) -> Path:

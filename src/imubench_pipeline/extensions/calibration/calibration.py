@@ -1,7 +1,7 @@
 """Bias, scale factor or attitude of one recording with known rates or directions, as rows."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,19 +14,18 @@ from imubench_pipeline.extensions.calibration.alignment.fine import align
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.least_squares import (
-    Limits,
+    Estimated,
     NotObservable,
     NotObservableError,
 )
 from imubench_pipeline.extensions.calibration.noise_source import (
-    NO_MODEL,
     NoiseSource,
-    explain_segments,
     find_noise_source,
     take_printed_noise,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
-from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
+from imubench_pipeline.extensions.calibration.rate_table import calibrate, residuals
+from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_segments
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.settings import (
     TRIAD,
@@ -191,7 +190,7 @@ def _attitude(
         yield from without("not_shown", reason)
         return
     if any(len(logs[name].segments) > 1 for name in TRIAD):
-        yield from without("not_shown", explain_segments(logs[TRIAD[0]]))
+        yield from without("not_shown", explain_segments(len(logs[TRIAD[0]].segments)))
         return
     at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
@@ -272,7 +271,7 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
     pointing = declared.pointing
     row = gyro.start_row("at_rest", pointing)
     if len(gyro.log.segments) > 1:
-        yield from _without(row, "not_shown", explain_segments(gyro.log))
+        yield from _without(row, "not_shown", explain_segments(len(gyro.log.segments)))
         return
     if gyro.source is None:
         yield from _without(row, "no_model", NO_MODEL)
@@ -290,11 +289,8 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
         scatter=_finite(bias.p_value[0]),
         half_width=bias.bound,
     )
-    figure = partial(_figure, gyro, about)
-    limits, noise = bias.fixed_interval(), bias.fixed_noise_sigma
-    yield figure("bias", bias.fixed, bias.fixed_sigma, limits, noise)
-    limits, noise = bias.present_interval(), bias.present_noise_sigma
-    yield figure("present_bias", bias.present, bias.present_sigma, limits, noise)
+    yield _figure(gyro, about, "bias", bias.fixed)
+    yield _figure(gyro, about, "present_bias", bias.present)
     yield from _open(row, bias.not_observable)
 
 
@@ -303,7 +299,7 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
     pointing = None if declared.axis is None else declared.axis.pointing
     row = gyro.start_row("rate_table", pointing)
     if len(gyro.log.segments) > 1:
-        yield from _without(row, "not_shown", explain_segments(gyro.log))
+        yield from _without(row, "not_shown", explain_segments(len(gyro.log.segments)))
         return
     try:
         schedule = _schedule(gyro, declared)
@@ -332,7 +328,10 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
         rates=len(left.dwell),
         scatter=_finite(fit.line.p_value[0]) if fit.line.freedom else None,
     )
-    yield from _line(partial(_figure, gyro, about), fit)
+    for name in ("bias", "scale_factor", "quadratic", "asymmetry", "linearity"):
+        estimated: Estimated | None = getattr(fit, name)
+        if estimated is not None:
+            yield _figure(gyro, about, name, estimated)
     yield from _open(row, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
@@ -387,41 +386,20 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
     return Schedule.from_steps(steps, log.rate, settling=settling)
 
 
-def _line(figure: Callable[..., CalibrationRow], fit: Calibration) -> Iterator[CalibrationRow]:
-    """Yield the estimates of the line, and of its deviations."""
-    noise = float(fit.line.sigma[0])
-    yield figure("bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
-    sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
-    yield figure("scale_factor", fit.scale_factor, sigma, interval, sigma)
-    for name, term in (("quadratic", fit.quadratic), ("asymmetry", fit.asymmetry)):
-        if term is not None:
-            row = figure(name, term.value, term.sigma, term.interval(), term.sigma)
-            yield replace(row, chance=float(term.p_value[0]))
-    if (straight := fit.linearity) is not None:
-        sigma = float(straight.sigma[int(np.abs(straight.deviation[0]).argmax())])
-        row = figure("linearity", straight.value, sigma, straight.interval(), sigma)
-        yield replace(row, chance=float(straight.p_value[0]))
-
-
 def _figure(
-    gyro: GyroLog,
-    about: partial[CalibrationRow],
-    name: str,
-    value: Array,
-    sigma: float,
-    interval: Limits,
-    noise: float,
+    gyro: GyroLog, about: partial[CalibrationRow], name: str, estimated: Estimated
 ) -> CalibrationRow:
-    lower, upper = interval
+    chance = estimated.p_value
     return about(
         parameter=name,
-        value=float(value[0]),
-        lower=float(lower[0]),
-        upper=float(upper[0]),
+        value=float(estimated.value[0]),
+        lower=float(estimated.lower[0]),
+        upper=float(estimated.upper[0]),
         unit=UNITS[name],
         status="ok",
-        sigma=float(sigma),
-        sigma_noise=noise,
+        sigma=estimated.sigma,
+        sigma_noise=estimated.noise_sigma,
+        chance=None if chance is None else float(chance[0]),
         truth=gyro.truth.get(name),
     )
 

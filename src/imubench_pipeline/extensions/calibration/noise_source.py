@@ -9,19 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
-from imubench_pipeline.extensions.calibration import reasons as texts
+from imubench_pipeline.extensions.calibration.reasons import (
+    describe_printed_noise,
+    describe_static_noise,
+)
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import Quality, find_static_recordings
-from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
 
-NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
 _DRAW_SEED = 20260101  # each recording and channel has an independent stream
 
 
@@ -57,7 +58,7 @@ def take_static_noise(
             name = min(gyros, key=lambda name: (name != channel, name))
             every = {estimate.method: estimate for estimate in read_estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
-            source = texts.static_noise(
+            source = describe_static_noise(
                 row.recording,
                 best[name].method,
                 device=row.device if row.device != own.device else None,
@@ -93,9 +94,4 @@ def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource |
     if channel not in origin.imu.axes or not origin.imu.axes[channel].noise.N:
         return None
     model = origin.imu.axes[channel].noise
-    return NoiseSource(model, model, texts.printed_noise(origin.source))
-
-
-def explain_segments(log: ChannelLog) -> str:
-    """Return the reason why a log of several segments cannot be used as one."""
-    return texts.several_segments(len(log.segments))
+    return NoiseSource(model, model, describe_printed_noise(origin.source))

@@ -12,12 +12,8 @@ from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
-from imubench_pipeline.extensions.calibration.noise_source import (
-    NO_MODEL,
-    NoiseSource,
-    explain_segments,
-    find_noise_source,
-)
+from imubench_pipeline.extensions.calibration.noise_source import NoiseSource, find_noise_source
+from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_segments
 from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
@@ -157,7 +153,7 @@ def _earth_rate(
     names = _names(key, declared, source)
     if len(log.segments) > 1 or log.position_elsewhere:
         reason = (
-            explain_segments(log)
+            explain_segments(len(log.segments))
             if len(log.segments) > 1
             else "the position has a clock of its own; give it as a column of the file that the "
             "gyro is in, or leave 'position' out"
@@ -222,7 +218,7 @@ def _earth_rate(
             yield from _without(names, part, "too_short", str(error))
             continue
         about = names | {"part": part, "dwells": len(chosen), "turns": len(chosen) - 1}
-        ranges = compute_sigma_ranges(courses.measured.blocks, model, drawn, bias)
+        ranges = compute_sigma_ranges(courses.measured.blocks, drawn, bias)
         yield from _estimates(about, courses, source, unsure, ranges)
         yield from _series(key, part, courses, begins)
 

@@ -28,7 +28,6 @@ from imubench_pipeline.extensions.calibration.experiment import (
     block_means,
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.calibration.sigma_range import sigma_range
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
@@ -43,6 +42,7 @@ GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"
 METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)  # in the order of display
 _MAX_POINTS = 400
 _TESTED_CLOCK_ERRORS = 20_001
+_TAIL_PROBABILITY = (1.0 - 0.95) / 2.0  # beyond each 95 % limit
 _Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 Range = dict[str, float]
@@ -141,7 +141,7 @@ def thin(points: int) -> Iterator[int]:
 
 
 def compute_sigma_ranges(
-    blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
+    blocks: Blocks, drawn: Sequence[NoiseModel], turn_on_bias: float | None
 ) -> dict[str, Range]:
     """Return the 95 % limits of the standard deviation of each method at the end of a run, rad/s.
 
@@ -160,10 +160,11 @@ def compute_sigma_ranges(
     ranges: dict[str, Range] = {}
     for method, sigma in methods.items():
         try:
-            limits = sigma_range(sigma, model, drawn)
+            values = [sigma(one) for one in drawn]
         except (ValueError, LinAlgError):
             continue  # no pair or triple in these dwells; the estimate has the reason
-        ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
+        lower, upper = np.quantile(values, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY]).tolist()
+        ranges[method] = {"sigma_lower": lower, "sigma_upper": upper}
     if "filter" in ranges:
         ranges["smoother"] = ranges["filter"]  # equal at the end of the run
     return ranges
