@@ -27,8 +27,8 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.alignment.accuracy import simulate_triad
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, matrix
 from imubench_pipeline.extensions.calibration.alignment.coarse import (
-    coarse_accuracy,
     coarse_alignment,
+    coarse_sigma,
     mean_vectors,
 )
 from imubench_pipeline.extensions.calibration.alignment.fine import FineAlignment, align
@@ -207,7 +207,12 @@ def triads() -> Iterator[tuple[str, Triad, Positions, How]]:
     better = NoiseModel(N=N / 500.0, B=B / 500.0, T_B=T_B, K=K / 500.0)
     flicker = NoiseModel(N=N / 500.0, B=B / 500.0, K=K / 500.0)
     bias = math.radians(0.1) / 3600.0
-    good = Triad.of_one_kind(better, ACCELEROMETER, gyro_bias=bias, accelerometer_bias=5e-3)
+    good = Triad(
+        gyros=[better] * 3,
+        accelerometers=[ACCELEROMETER] * 3,
+        gyro_bias=bias,
+        accelerometer_bias=5e-3,
+    )
     unlike = Triad(
         gyros=(better, flicker, NoiseModel(N=N / 250.0, K=K / 100.0)),
         accelerometers=(ACCELEROMETER, NoiseModel(N=2e-3, B=3e-4), NoiseModel(N=1e-3)),
@@ -222,7 +227,12 @@ def triads() -> Iterator[tuple[str, Triad, Positions, How]]:
     yield "the same, two opposite positions", good, two, "together"
     yield "unlike axes, one position", unlike, one, "together"
     yield "unlike axes, two positions", unlike, two, "together"
-    paper = Triad.of_one_kind(PAPER_MODEL, ACCELEROMETER, gyro_bias=BIAS, accelerometer_bias=0.02)
+    paper = Triad(
+        gyros=[PAPER_MODEL] * 3,
+        accelerometers=[ACCELEROMETER] * 3,
+        gyro_bias=BIAS,
+        accelerometer_bias=0.02,
+    )
     yield (
         "the paper's gyro, one position of an hour",
         paper,
@@ -245,7 +255,7 @@ def aligned(runs: int) -> Iterator[bool]:
         fine = FineAlignment(triad, positions, SITE, ATTITUDE)
         number = min(runs, ALIGNED) if how == "one by one" else runs
         print(f"\nalignment, {name}: {number} runs, {len(positions.blocks)} blocks")
-        minutes = fine.time / 60.0
+        minutes = fine.positions.blocks.end / 60.0
         for place in np.searchsorted(minutes, minutes[-1] * np.array([0.1, 0.3, 1.0]) - 1e-9):
             roll, pitch, heading = np.degrees(fine.sigma[place])
             print(
@@ -290,7 +300,7 @@ def of_triad(
     size = {
         name: np.sqrt(np.mean(np.concatenate(one) ** 2, axis=0)) for name, one in errors.items()
     }
-    coarse = coarse_accuracy(triad, positions, SITE, ATTITUDE).sigma
+    coarse = coarse_sigma(triad, positions, SITE, ATTITUDE)
     for stage, sigmas in (("coarse", coarse), ("fine", fine.sigma[-1])):
         for angle, error, sigma in zip(
             ("roll", "pitch", "heading"), size[stage].tolist(), sigmas.tolist(), strict=True
@@ -323,8 +333,11 @@ def asymptotes() -> Iterator[bool]:
     """Print what an hour in one position leaves, against closed forms."""
     print("\nalignment: an hour in one position, level, x north, quiet sensors with fixed biases")
     bias, force = math.radians(0.01) / 3600.0, 2e-4
-    triad = Triad.of_one_kind(
-        NoiseModel(N=bias / 10.0), NoiseModel(N=1e-5), gyro_bias=bias, accelerometer_bias=force
+    triad = Triad(
+        gyros=[NoiseModel(N=bias / 10.0)] * 3,
+        accelerometers=[NoiseModel(N=1e-5)] * 3,
+        gyro_bias=bias,
+        accelerometer_bias=force,
     )
     sigma = FineAlignment(triad, Positions.at_rest(3600.0, 60.0, 1.0), SITE, np.eye(3)).sigma[-1]
     tilt = force / SITE.gravity

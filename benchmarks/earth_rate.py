@@ -116,9 +116,9 @@ class Moments:
 def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: slice) -> Tally:
     """Return what filter and pairs do in simulated runs."""
     blocks = one.blocks
-    freedoms = {"NEES": len(one.names) + 1, "NEES of the rate": 1, "NIS": 1}
+    freedoms = {"NEES": count_states(one) + 1, "NEES of the rate": 1, "NIS": 1}
     epochs = len(blocks.start[after])
-    at_once = max(PART // (len(blocks) * (len(one.names) + 2)), 1)
+    at_once = max(PART // (len(blocks) * (count_states(one) + 2)), 1)
     inside = {name: np.zeros(epochs) for name in freedoms}
     mean = {name: np.zeros(epochs) for name in freedoms}
     errors = {name: Moments() for name in ("filter", "pairs", "A-B-A", "drift")}
@@ -152,6 +152,11 @@ def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: sli
     )
 
 
+def count_states(one: RateFilter) -> int:
+    """Return the number of states of the gyro's error."""
+    return one.run(np.zeros((1, len(one.blocks)))).states.shape[2] - 2
+
+
 def of_part(found: Filtered, states: Array) -> dict[str, Array]:
     """Return the squares that are compared with their bounds, each of shape (runs, b)."""
     return {
@@ -175,7 +180,7 @@ def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterato
     print(
         f"\n{name}: {model.name}, {tally.runs} runs of {given.minutes:g} min, {len(design.dwells)} "
         f"dwells, {len(blocks)} blocks of up to {longest / PAPER_RATE:.3g} s, "
-        f"{len(one.names)} states"
+        f"{count_states(one)} states"
     )
     for what, part in tally.inside.items():
         text = (

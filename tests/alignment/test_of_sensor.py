@@ -68,7 +68,12 @@ def outlook(
 
 def test_one_position_is_no_better_than_its_biases() -> None:
     bias = 0.1 * EARTH_RATE
-    triad = Triad.of_one_kind(GYRO, ACCELEROMETER, gyro_bias=bias, accelerometer_bias=0.05)
+    triad = Triad(
+        gyros=[GYRO] * 3,
+        accelerometers=[ACCELEROMETER] * 3,
+        gyro_bias=bias,
+        accelerometer_bias=0.05,
+    )
     for one in accuracies(triad, SITE, 100.0, [3600.0]):
         if one.positions == 1:
             tilt, north = 0.05 / SITE.gravity, bias / EARTH_RATE / math.cos(SITE.latitude)
@@ -79,7 +84,9 @@ def test_one_position_is_no_better_than_its_biases() -> None:
 
 
 def test_two_positions_of_white_noise_have_the_mean_of_both() -> None:
-    triad = Triad.of_one_kind(GYRO, ACCELEROMETER, gyro_bias=0.01, accelerometer_bias=0.2)
+    triad = Triad(
+        gyros=[GYRO] * 3, accelerometers=[ACCELEROMETER] * 3, gyro_bias=0.01, accelerometer_bias=0.2
+    )
     for one in accuracies(triad, SITE, 100.0, [602.0]):
         if one.positions == 2:
             tilt = 1e-3 / math.sqrt(600.0) / SITE.gravity
@@ -91,8 +98,11 @@ def test_two_positions_of_white_noise_have_the_mean_of_both() -> None:
 @pytest.mark.parametrize("density", [1e-6, 3e-4])  # the heading is small, and it is not
 def test_errors_of_simulated_triads_are_as_large_as_said(density: float) -> None:
     gyro = NoiseModel(N=density, B=density / 30, T_B=60.0)
-    triad = Triad.of_one_kind(
-        gyro, NoiseModel(N=1e-3, B=3e-4, T_B=40.0), gyro_bias=1e-3, accelerometer_bias=0.2
+    triad = Triad(
+        gyros=[gyro] * 3,
+        accelerometers=[NoiseModel(N=1e-3, B=3e-4, T_B=40.0)] * 3,
+        gyro_bias=1e-3,
+        accelerometer_bias=0.2,
     )
     rng = np.random.default_rng(3)
     for one in accuracies(triad, SITE, 100.0, [300.0, 600.0], runs=400, rng=rng):

@@ -73,7 +73,7 @@ def test_estimates_are_consistent(design, model):
         rng=np.random.default_rng(7),
     )
     found = one.run(drawn.means)
-    freedom = len(one.names) + 1
+    freedom = drawn.states.shape[2] + 1
     after = np.flatnonzero(blocks.dwell >= 1)[1:]
     # The sum over runs at an epoch is chi-squared; a bound for a hundred epochs and designs.
     tail = 1e-6

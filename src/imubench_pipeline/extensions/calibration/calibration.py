@@ -33,7 +33,6 @@ from imubench_pipeline.extensions.calibration.settings import (
     InPositions,
     OnRateTable,
     SimulatedPositions,
-    SimulatedRest,
     SimulatedTable,
 )
 from imubench_pipeline.extensions.calibration.still import bias_at_rest
@@ -96,21 +95,26 @@ def make_calibration_tables(
         gyros = (name for name in [*logs, *metadata.unusable] if name.startswith("gyro_"))
         channel: str = declared.channel or next(gyros)
         key = Key(sensor, recording, channel)
+        run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
+        row = partial(CalibrationRow, **asdict(key), run=run)
         if channel not in logs:
-            run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
             reason = f"{channel} cannot be used; see the findings of the recording"
-            rows = _without(partial(CalibrationRow, **asdict(key), run=run), "not_shown", reason)
+            rows = _without(row, "not_shown", reason)
         else:
             source = find_noise_source(folder, static, key, stated)
-            begins, truth = metadata.begins, _truth(simulated, channel)
-            log = GyroLog(key, logs[channel], source, begins, truth)
-            if isinstance(declared, OnRateTable):
-                rows = _on_rate_table(log, declared)
-            else:
-                rows = _at_rest(log, declared)
-    for row in rows:
-        tables[row.table].append(row)
+            truth = _truth(simulated, channel)
+            log = GyroLog(key, logs[channel], source, metadata.begins, truth)
+            rows = _calibrate_gyro(row, log, declared)
+    for made in rows:
+        tables[made.table].append(made)
     return tables
+
+
+_EXPERIMENTS: Mapping[str, type[InPositions | OnRateTable | AtRest]] = {
+    "positions": InPositions,
+    "rate_table": OnRateTable,
+    "pointing": AtRest,
+}
 
 
 def _declared(
@@ -118,18 +122,10 @@ def _declared(
 ) -> InPositions | OnRateTable | AtRest:
     """Return the block in the notes of a log, or its equivalent for a simulated one."""
     if simulated is not None:
-        block = (
-            simulated.block(SimulatedPositions)
-            or simulated.block(SimulatedTable)
-            or simulated.block(SimulatedRest)
-        )
-        assert block is not None  # only recordings with one of them are calibrated
-        return block.declared
-    if "positions" in sections:
-        return InPositions.model_validate(sections["positions"])
-    if "rate_table" in sections:
-        return OnRateTable.model_validate(sections["rate_table"])
-    return AtRest.model_validate(sections["pointing"])
+        blocks = map(simulated.block, _EXPERIMENTS.values())
+        return next(block for block in blocks if block is not None)
+    key = next(key for key in _EXPERIMENTS if key in sections)
+    return _EXPERIMENTS[key].model_validate(sections[key])
 
 
 def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
@@ -154,17 +150,6 @@ class GyroLog:
     source: NoiseSource | None  # without it nothing is estimated
     begins: float  # time of the first sample used, s from the first of the recording
     truth: Mapping[str, float]  # true figures of a simulation, SI
-
-    def start_row(self, run: str, pointing: Pointing | None) -> partial[CalibrationRow]:
-        """Return the columns that all rows of the table ``calibration`` share."""
-        row = partial(CalibrationRow, **asdict(self.key), run=run)
-        if self.source is not None:
-            row = partial(row, model=self.source.model.name, model_from=self.source.words)
-        if pointing is not None:
-            row = partial(row, earth_rate=pointing.rate, earth_rate_sigma=pointing.rate_sigma)
-            row = partial(row, latitude=pointing.latitude, heading=pointing.heading)
-            row = partial(row, elevation=pointing.elevation)
-        return row
 
 
 def _attitude(
@@ -266,13 +251,29 @@ def _average_positions(
     return Positions(blocks, rotation(angles)), means
 
 
-def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
-    """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
-    pointing = declared.pointing
-    row = gyro.start_row("at_rest", pointing)
+def _calibrate_gyro(
+    row: partial[CalibrationRow], gyro: GyroLog, declared: OnRateTable | AtRest
+) -> Iterator[TableRow]:
+    """Yield the rows of a gyro, or the reason without them."""
+    axis = declared.axis if isinstance(declared, OnRateTable) else declared
+    pointing = None if axis is None else axis.pointing
+    if gyro.source is not None:
+        row = partial(row, model=gyro.source.model.name, model_from=gyro.source.words)
+    if pointing is not None:
+        row = partial(row, earth_rate=pointing.rate, earth_rate_sigma=pointing.rate_sigma)
+        row = partial(row, latitude=pointing.latitude, heading=pointing.heading)
+        row = partial(row, elevation=pointing.elevation)
     if len(gyro.log.segments) > 1:
         yield from _without(row, "not_shown", explain_segments(len(gyro.log.segments)))
         return
+    if isinstance(declared, OnRateTable):
+        yield from _on_rate_table(row, gyro, declared, pointing)
+    else:
+        yield from _at_rest(row, gyro, declared.pointing)
+
+
+def _at_rest(row: partial[CalibrationRow], gyro: GyroLog, pointing: Pointing) -> Iterator[TableRow]:
+    """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
     if gyro.source is None:
         yield from _without(row, "no_model", NO_MODEL)
         return
@@ -294,13 +295,10 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
     yield from _open(row, bias.not_observable)
 
 
-def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
+def _on_rate_table(
+    row: partial[CalibrationRow], gyro: GyroLog, declared: OnRateTable, pointing: Pointing | None
+) -> Iterator[TableRow]:
     """Yield scale factor and bias of a gyro on a rate table, or the reason without them."""
-    pointing = None if declared.axis is None else declared.axis.pointing
-    row = gyro.start_row("rate_table", pointing)
-    if len(gyro.log.segments) > 1:
-        yield from _without(row, "not_shown", explain_segments(len(gyro.log.segments)))
-        return
     try:
         schedule = _schedule(gyro, declared)
     except ValueError as error:

@@ -76,7 +76,6 @@ class Smoothed:
     rate_sigma: float  # its standard deviation, rad/s
     drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
     drift_sigma: Array  # shape (b,); its standard deviation, rad/s
-    states: Array  # shape (runs, b, m + 2); as in `Filtered`
 
 
 class RateFilter:
@@ -98,14 +97,9 @@ class RateFilter:
         if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
-        self._states = discretise_blocks(model, blocks, turn_on_bias)
+        states = discretise_blocks(model, blocks, turn_on_bias)
         start = np.array([[rate_sigma]])
-        self._filter = BlockFilter((self._states,), blocks.seen[:, None, None], start)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The m states of the gyro's error, see `states.BlockStates`; the rate is before them."""
-        return self._states.names
+        self._filter = BlockFilter((states,), blocks.seen[:, None, None], start)
 
     @property
     def rate_sigma(self) -> Array:
@@ -152,4 +146,4 @@ class RateFilter:
             forecast = filtered.states[:, k] @ transition.T
             states[:, k] += (states[:, k + 1] - forecast) @ gain.T
         rate_sigma = float(self.rate_sigma[-1])
-        return Smoothed(states[:, -1, 0], rate_sigma, states[:, :, -1], sigma, states)
+        return Smoothed(states[:, -1, 0], rate_sigma, states[:, :, -1], sigma)

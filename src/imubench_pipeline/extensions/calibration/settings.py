@@ -246,11 +246,6 @@ class SimulatedTable(OnRateTable):
             raise ValueError("steps is missing; expected the steady rates of the table")
         return self
 
-    @property
-    def declared(self) -> OnRateTable:
-        """The notes of a log like this one."""
-        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
-
 
 class SimulatedPositions(InPositions):
     """A triad that is turned by a schedule, and senses gravity and the Earth's rate."""
@@ -269,22 +264,12 @@ class SimulatedPositions(InPositions):
         heading = math.remainder(heading, 2.0 * math.pi)
         return {"roll": roll, "pitch": pitch, "heading": heading}
 
-    @property
-    def declared(self) -> InPositions:
-        """The notes of a log like this one."""
-        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
-
 
 class SimulatedRest(AtRest):
     """A gyro at rest that senses its part of the Earth's rate."""
 
     true_heading: Angle = Field("0 deg", description="true heading of the axis, if heading is null")
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
-
-    @property
-    def declared(self) -> AtRest:
-        """The notes of a log like this one."""
-        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
 
     @property
     def true(self) -> Pointing:

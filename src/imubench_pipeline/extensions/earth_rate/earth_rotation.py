@@ -74,7 +74,7 @@ def make_earth_rate_tables(
     if "simulated" in sections:
         simulated = SimulatedRecording.model_validate(sections["simulated"])
         turns = simulated.block(SimulatedTurns)
-    declared = turns.declared if turns else TwoPosition.model_validate(sections["two_position"])
+    declared = turns or TwoPosition.model_validate(sections["two_position"])
     metadata = read_metadata(next(iter(logs.values())).path)
     channel = declared.moved_gyro([*logs, *metadata.unusable])
     key = Key(sensor, recording, channel)

@@ -86,7 +86,7 @@ def simulate_runs(
 ) -> Runs:
     """Draw exact block means of runs; the rate, and sigma of the fixed biases, are in rad/s."""
     block_model = discretise_blocks(model, blocks, turn_on_bias)
-    m = len(block_model.names)
+    m = len(block_model.initial)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
     for k, which in enumerate(block_model.which):

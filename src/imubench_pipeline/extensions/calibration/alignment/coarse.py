@@ -9,22 +9,12 @@ Wiley 1971, chapter 9)
     psi_N = df_E / g,   psi_E = -df_N / g,   psi_D = dw_E / (w_ie cos(L)) - tan(L) psi_N.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.typing import Array
-
-
-@dataclass(frozen=True)
-class CoarseAccuracy:
-    """Uncertainty of an attitude."""
-
-    psi: Array  # shape (3, 3); covariance of the small errors about north, east and down, rad^2
-    sigma: Array  # shape (3,); standard deviations of roll, pitch and heading, rad
 
 
 def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
@@ -52,10 +42,11 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     return force, rate
 
 
-def coarse_accuracy(
-    triad: Triad, positions: Positions, site: Site, attitude: Array
-) -> CoarseAccuracy:
-    """Return the uncertainty of coarse alignment about a true attitude, shape (3, 3)."""
+def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array) -> Array:
+    """Return standard deviations of coarse alignment about a true attitude, shape (3, 3).
+
+    They are of roll, pitch and heading, rad, shape (3,).
+    """
     weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
     of_sensor = []
     for three in (triad.axes[:3], triad.axes[3:]):
@@ -73,7 +64,7 @@ def coarse_accuracy(
     of_rate[2, 1] = 1.0 / north
     psi = of_rate @ of_sensor[0] @ of_rate.T + of_force @ of_sensor[1] @ of_force.T
     euler = euler_jacobian(attitude)
-    return CoarseAccuracy(psi, np.sqrt(np.diag(euler @ psi @ euler.T)))
+    return np.sqrt(np.diag(euler @ psi @ euler.T))
 
 
 def _compute_weights(positions: Positions) -> Array:

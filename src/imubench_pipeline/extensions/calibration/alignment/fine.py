@@ -61,11 +61,6 @@ class FineAlignment:
         self._euler = euler_jacobian(attitude)
 
     @property
-    def time(self) -> Array:
-        """End of each block, s, shape (b,)."""
-        return self.positions.blocks.end
-
-    @property
     def psi_covariance(self) -> Array:
         """Covariance of the error of the attitude after each block, rad^2, shape (b, 3, 3)."""
         roots = self._filter.roots[:, :3]
