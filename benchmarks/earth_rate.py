@@ -320,20 +320,22 @@ def outlook() -> None:
     one = Outlook(PAPER_MODEL, ASSUMED_LATITUDE, ASSUMED_TURNING, PAPER_RATE)
     for relative in (1.0, 0.1, 0.01):
         turns = one.turns_needed(28.0, relative)
-        hours = one.time_needed(28.0, relative) / 3600.0
+        assert turns is not None
+        hours = one.run_time(28.0, turns) / 3600.0
         print(
             f"  {100 * relative:3.0f} % of the rate: {turns} turns, dwells of 28 s, {hours:.3f} h"
         )
     for minutes in (10.0, 60.0):
         curve = one.over_dwell(60.0 * minutes)
         best = curve.best
+        near = curve.dwell[curve.nearly_best]
         least, of_one_turn = (math.degrees(curve.sigma[place]) for place in (best, 0))
         print(
             f"  best dwell in {minutes:g} min: {curve.dwell[best]:.1f} s ({curve.dwells[best]} "
             f"dwells), sigma {least:.6f} deg/s; with one turn {of_one_turn:.6f}; within 1 % of the "
-            f"best from {curve.nearly_best()[0]:.1f} to {curve.nearly_best()[1]:.1f} s"
+            f"best from {near.min():.1f} to {near.max():.1f} s"
         )
-    heading = one.heading(28.0, 119)
+    heading = one.sigmas_after(28.0, 119) / EARTH_RATE
     print(
         f"  heading by gyrocompassing: {math.degrees(heading[0]):.1f} deg after one turn, "
         f"{math.degrees(heading[-1]):.1f} deg after 1 h"
