@@ -21,10 +21,10 @@ from imubench_pipeline.extensions.aided.trajectories import (
     Signals,
     Spreads,
     Trajectory,
-    compute_headings,
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -128,7 +128,9 @@ def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel)
         way.rate,
         way.force,
         np.column_stack([
-            way.position[drive.at], way.velocity[drive.at], compute_headings(way.attitude[drive.at])
+            way.position[drive.at],
+            way.velocity[drive.at],
+            euler_angles(way.attitude[drive.at])[:, 2],
         ]),
         np.full((len(drive.at), 6), np.nan),
         np.zeros(9),

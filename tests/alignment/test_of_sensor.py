@@ -14,11 +14,8 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
-from imubench_pipeline.extensions.earth_rate.outlook import (
-    TIMES,
-    load_noise_at_rest,
-    make_outlook_tables,
-)
+from imubench_pipeline.extensions.calibration.noise_source import load_noise_at_rest
+from imubench_pipeline.extensions.earth_rate.outlook import TIMES, make_outlook_tables
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables.files import build, write

@@ -43,6 +43,7 @@ from imubench_pipeline.extensions.aided.trajectories import (
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.calibration.noise_source import lend_axes
 from imubench_pipeline.extensions.exports.overbound import overbound
 from imubench_pipeline.extensions.exports.request import curve_of
 from imubench_pipeline.model.estimates import AllanRow, LowPassRow
@@ -90,12 +91,7 @@ _MAX_SHARE_ERROR = 0.05  # of a consistent filter, including two standard errors
 
 def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
     """Return models of all six channels; a missing axis takes one of the same quantity."""
-    whole = {}
-    for channel in CHANNELS:
-        own = [name for name in models if quantity_of(name) == quantity_of(channel)]
-        here = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
-        whole[channel] = models[here]
-    return whole
+    return {channel: models[lent] for channel, lent in lend_axes(models).items()}
 
 
 def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:

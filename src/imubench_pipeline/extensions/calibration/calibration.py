@@ -21,6 +21,8 @@ from imubench_pipeline.extensions.calibration.least_squares import (
 from imubench_pipeline.extensions.calibration.noise_source import (
     NoiseSource,
     find_noise_source,
+    lend_axes,
+    load_noise_at_rest,
     take_printed_noise,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
@@ -28,7 +30,6 @@ from imubench_pipeline.extensions.calibration.rate_table import calibrate, resid
 from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_segments
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.settings import (
-    TRIAD,
     AtRest,
     InPositions,
     OnRateTable,
@@ -41,11 +42,10 @@ from imubench_pipeline.extensions.calibration.tables import (
     CalibrationPointRow,
     CalibrationRow,
 )
-from imubench_pipeline.extensions.earth_rate.outlook import load_noise_at_rest
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import load_logs
 from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
-from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
@@ -169,21 +169,20 @@ def _attitude(
         for name in _ANGLES:
             yield about(parameter=name, status=status, reason=reason)
 
-    missing = [name for name in TRIAD if name not in logs]
+    missing = [name for name in CHANNELS if name not in logs]
     if missing:
         reason = f"{', '.join(missing)} cannot be used; see the findings of the recording"
         yield from without("not_shown", reason)
         return
-    if any(len(logs[name].segments) > 1 for name in TRIAD):
-        yield from without("not_shown", explain_segments(len(logs[TRIAD[0]].segments)))
+    if any(len(logs[name].segments) > 1 for name in CHANNELS):
+        yield from without("not_shown", explain_segments(len(logs[CHANNELS[0]].segments)))
         return
     at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
-        names = (*at_rest.select_axes("gyro"), *at_rest.select_axes("accel"))
-        models = [at_rest.models[name] for name in names]
+        models = [at_rest.models[name] for name in lend_axes(at_rest.models).values()]
         words = f"static recording {at_rest.recording}"
     else:
-        printed = [take_printed_noise(key.sensor, sensor, channel) for channel in TRIAD]
+        printed = [take_printed_noise(key.sensor, sensor, channel) for channel in CHANNELS]
         known = [source for source in printed if source is not None]
         if len(known) < 6:
             yield from without("no_model", NO_MODEL)
@@ -191,7 +190,7 @@ def _attitude(
         models, words = [source.model for source in known], known[0].words
     about = partial(about, model=models[0].name, model_from=words)
     try:
-        positions, means = _average_positions([logs[name] for name in TRIAD], declared)
+        positions, means = _average_positions([logs[name] for name in CHANNELS], declared)
         triad = Triad(
             gyros=models[:3],
             accelerometers=models[3:],

@@ -4,7 +4,7 @@ The log of a turned gyro does not show its noise. The model is of the longest st
 the same sensor, and device if possible, or else of the typical figures of its datasheet.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import Quality, find_static_recordings
-from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
@@ -69,6 +69,39 @@ def take_static_noise(
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, source, drawn)
     return None
+
+
+@dataclass(frozen=True)
+class NoiseAtRest:
+    """The noise of a sensor at rest."""
+
+    recording: str
+    rate: float  # Hz
+    models: dict[str, NoiseModel]  # by channel
+
+
+def load_noise_at_rest(folders: Sequence[Path]) -> NoiseAtRest | None:
+    """Return the noise of a sensor from its static recordings; None if none has an estimate."""
+    for row, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
+        best = read_recommended_estimates(folder / "parameters.parquet")
+        models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
+        if row.rate is not None and any(name.startswith("gyro_") for name in models):
+            return NoiseAtRest(row.recording, row.rate, models)
+    return None
+
+
+def lend_axes(channels: Collection[str]) -> dict[str, str]:
+    """Return the channel that gives each axis its model: itself, or another of its quantity.
+
+    A quantity without channels has none.
+    """
+    lent = {}
+    for channel in CHANNELS:
+        own = [name for name in channels if quantity_of(name) == quantity_of(channel)]
+        if own:
+            other = own["xyz".index(channel[-1]) % len(own)]
+            lent[channel] = channel if channel in own else other
+    return lent
 
 
 def find_noise_source(

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.settings.experiments import Experiment, Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
     Angle,
@@ -23,9 +24,6 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.units import parse_quantity
 
 _MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
-
-TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-"""The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
@@ -227,7 +225,7 @@ class InPositions(Experiment):
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
         """Raise ValueError if the log lacks one of the six axes."""
-        missing = [name for name in TRIAD if name not in channels]
+        missing = [name for name in CHANNELS if name not in channels]
         if missing:
             raise ValueError(
                 f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"

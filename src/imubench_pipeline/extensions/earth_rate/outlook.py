@@ -17,11 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.noise_source import (
+    NoiseAtRest,
+    lend_axes,
+    load_noise_at_rest,
+)
 from imubench_pipeline.extensions.earth_rate.bound import (
     MAX_BLOCKS,
     choose_block_length,
@@ -33,7 +37,6 @@ from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow, EarthRa
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import find_static_recordings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.tables.keys import Key
@@ -227,37 +230,6 @@ _CHECK_SEED = 20260101
 _TYPICAL_KINDS = ("1sigma", "typ")
 
 
-@dataclass(frozen=True)
-class Noise:
-    """The noise of a sensor at rest."""
-
-    recording: str
-    rate: float  # Hz
-    models: dict[str, NoiseModel]  # by channel
-
-    def select_axes(self, quantity: str) -> tuple[str, ...]:
-        """Return the channels whose models the axes x, y and z of a quantity have.
-
-        An axis that is missing in the log has the noise of another one.
-        """
-        names = [name for name in self.models if name.startswith(quantity)]
-        wanted = (f"{quantity}_{axis}" for axis in "xyz")
-        return tuple(
-            own if own in self.models else names[place % len(names)]
-            for place, own in enumerate(wanted)
-        )
-
-
-def load_noise_at_rest(folders: Sequence[Path]) -> Noise | None:
-    """Return the noise of a sensor from its static recordings; None if none has an estimate."""
-    for row, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
-        best = read_recommended_estimates(folder / "parameters.parquet")
-        models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
-        if row.rate is not None and any(name.startswith("gyro_") for name in models):
-            return Noise(row.recording, row.rate, models)
-    return None
-
-
 def make_outlook_tables(
     folders: Sequence[Path], sensor: str, settings: str
 ) -> dict[str, Sequence[TableRow]]:
@@ -291,9 +263,12 @@ def make_outlook_tables(
 
 
 def _predict_alignment(
-    sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
+    sensor: str, noise: NoiseAtRest, printed: Datasheet, how: EarthRateSettings
 ) -> Iterator[AlignmentRow]:
-    gyros, accelerometers = noise.select_axes("gyro"), noise.select_axes("accel")
+    axes = lend_axes(noise.models)
+    gyros, accelerometers = (
+        tuple(axes[f"{quantity}_{axis}"] for axis in "xyz") for quantity in QUANTITIES
+    )
     gyro_bias, gyro_words = _find_bias(printed, "gyro", how)
     accelerometer_bias, accelerometer_words = _find_bias(printed, "accel", how)
     triad = Triad(
