@@ -32,7 +32,6 @@ from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -179,9 +178,8 @@ class AllowedSigmas:
     sigma_filter: float
 
 
-def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> AllowedSigmas:
-    """Return the standard deviations by noise of estimates of a run, over a duration in s."""
-    design = run.experiment(duration)
+def compute_allowed_sigmas(design: Experiment, model: NoiseModel) -> AllowedSigmas:
+    """Return the standard deviations by noise of estimates of a run."""
     blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
     return AllowedSigmas(
