@@ -18,7 +18,6 @@ from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_s
 from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
-    Course,
     Courses,
     Range,
     compute_allowed_sigmas,
@@ -350,8 +349,8 @@ def _without(
 
 def _series(key: Key, part: str, courses: Courses, begins: float) -> Iterator[EarthRateSeriesRow]:
     """Yield the rows of the table ``earth_rate_series``."""
-    drift = Course("smoother", courses.drift_time, courses.drift, courses.drift_sigma)
-    for quantity, course in [*(("rate", course) for course in courses.courses), ("drift", drift)]:
+    rates = [("rate", course) for course in courses.courses]
+    for quantity, course in [*rates, ("drift", courses.drift)]:
         for k in thin(len(course.time)):
             yield EarthRateSeriesRow(
                 **asdict(key),

@@ -66,10 +66,7 @@ class Courses:
     courses: tuple[Course, ...]  # one per method
     measured: Measured
     longest: int  # largest number of samples of a block
-    # shape (b,); middle of each block, s, smoothed slow error with the bias, and its sigma, rad/s
-    drift_time: Array
-    drift: Array
-    drift_sigma: Array
+    drift: Course  # smoothed slow error with the bias, at the middle of each block
 
 
 def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
@@ -125,8 +122,8 @@ def estimate_courses(
         after = settled(tracked.mean, experiment.rate, EARTH_RATE)
         time = tracked.sample / experiment.rate
         courses.append(Course(method, time, tracked.mean, None, settled=after))
-    middle, drift = first + blocks.middle, smoothed.drift[0]
-    return Courses(tuple(courses), measured, longest, middle, drift, smoothed.drift_sigma)
+    drift = Course("smoother", first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma)
+    return Courses(tuple(courses), measured, longest, drift)
 
 
 def thin(points: int) -> Iterator[int]:

@@ -37,9 +37,7 @@ class LevelBlocks:
     """A log as means of short blocks."""
 
     length: float  # of a block, s
-    # mean, level: shape (b,); mean of the samples present, or NaN, and running median, rad/s
-    mean: Array
-    level: Array
+    level: Array  # shape (b,); running median, rad/s; NaN where there are no samples
     z: Array  # shape (b,); mean less level in standard deviations; 0 where there are no samples
     present: NDArray[np.bool_]  # shape (b,); where there are samples
     sigma: float  # standard deviation of the noise of a full block, rad/s
@@ -100,7 +98,7 @@ def average_log_blocks(
         of_model = math.sqrt(float(model.allan_variance(length, rate)))
         rough = not 2 / 3 < own / of_model < 1.5
         sigma = own if rough else of_model
-    return LevelBlocks(length, mean, level, residual / sigma, present, sigma, rough)
+    return LevelBlocks(length, level, residual / sigma, present, sigma, rough)
 
 
 def _estimate_sigma(residual: Array) -> float:
