@@ -12,7 +12,6 @@ from imubench_pipeline.extensions.aided.runs import (
     INITIAL_TILT_SIGMA,
     WARM_UP,
     Drive,
-    Outage,
     Outcome,
     schedule_outages,
 )
@@ -122,7 +121,7 @@ def plain_variances(drive: Drive, axes: list[AxisStates]) -> np.ndarray:
 )
 def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel) -> None:
     way = simulate_trajectory("drone", 12.0, 50.0)
-    drive = Drive(way, [Outage(5.0, 5.0)])
+    drive = Drive(way, [(5.0, 5.0)])
     axes = tuned(gyro, ACCEL, 50.0, scale=3e-3)
     ideal = Signals(
         way.rate,
@@ -152,7 +151,7 @@ def outcomes(request: pytest.FixtureRequest) -> dict:
     def of_run(number: int) -> Signals:
         return simulate_signals(way, axes, SPREADS, 100, 7, ("car", str(number)))
 
-    assert [outage.length for outage in drive.outages].count(60.0) == 2
+    assert len(drive.of_outages(60.0)) == 2
     found = drive.repeat(tunings, of_run, request.param, threads=2)
     return {"drive": drive, "runs": request.param, **found}
 

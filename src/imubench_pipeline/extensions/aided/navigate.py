@@ -426,7 +426,7 @@ def _describe_tuning(
         "tuning": name,
         "model": "; ".join(f"{quantity} {', '.join(own)}" for quantity, own in terms.items()),
         "outage": length,
-        "outages": sum(o.length == length for o in drive.outages) * len(outcome.errors),
+        "outages": 0 if length is None else len(drive.of_outages(length)) * len(outcome.errors),
         "states": outcome.states,
     }
     for error in ERRORS:
