@@ -138,8 +138,8 @@ def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: sli
             errors["filter"].add(found.rate - EARTH_RATE)
             errors["pairs"].add(by_pairs(means, blocks, model).rate - EARTH_RATE)
             errors["A-B-A"].add(by_triples(means, blocks, model).rate - EARTH_RATE)
-            smoothed = one.smooth(found)
-            errors["drift"].add((smoothed.drift - drawn.drift[part]) / smoothed.drift_sigma)
+            drift, sigma = one.smooth(found)
+            errors["drift"].add((drift - drawn.drift[part]) / sigma)
     total = CHUNK * -(-runs // CHUNK)
     return Tally(
         total,

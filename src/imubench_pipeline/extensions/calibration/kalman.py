@@ -68,16 +68,6 @@ class Filtered:
         return squares
 
 
-@dataclass(frozen=True)
-class Smoothed:
-    """Smoothed estimates of each block from all the data."""
-
-    rate: Array  # shape (runs,); estimated Earth's rate, rad/s: the last filtered value
-    rate_sigma: float  # its standard deviation, rad/s
-    drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
-    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
-
-
 class RateFilter:
     """The filter of one design: blocks and noise model. It filters any number of runs at once.
 
@@ -123,8 +113,12 @@ class RateFilter:
             roots,
         )
 
-    def smooth(self, filtered: Filtered) -> Smoothed:
-        """Smooth the result of `run` (Rauch, Tung and Striebel), with square roots."""
+    def smooth(self, filtered: Filtered) -> tuple[Array, Array]:
+        """Smooth the drift in the result of `run` (Rauch, Tung and Striebel), with square roots.
+
+        Returned are the drift of each block from all the data, rad/s, shape (runs, b), and its
+        standard deviation, shape (b,). The smoothed rate is the last filtered one.
+        """
         states, root = filtered.states.copy(), self._filter.roots[-1]
         sigma = np.empty(len(self.blocks))  # of the drift at each block
         sigma[-1] = compute_deviation(root, -1)
@@ -145,5 +139,4 @@ class RateFilter:
             sigma[k] = compute_deviation(root, -1)
             forecast = filtered.states[:, k] @ transition.T
             states[:, k] += (states[:, k + 1] - forecast) @ gain.T
-        rate_sigma = float(self.rate_sigma[-1])
-        return Smoothed(states[:, -1, 0], rate_sigma, states[:, :, -1], sigma)
+        return states[:, :, -1], sigma

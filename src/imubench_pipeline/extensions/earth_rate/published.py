@@ -97,7 +97,7 @@ def estimate_courses(
         blocks, model, turn_on_bias=UNINFORMATIVE_SIGMA if turn_on_bias is None else turn_on_bias
     )
     filtered = rate_filter.run(means)
-    smoothed = rate_filter.smooth(filtered)
+    drift, drift_sigma = rate_filter.smooth(filtered)
     # Before the second position the rate and the bias are not separable.
     from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
@@ -111,7 +111,7 @@ def estimate_courses(
     filter_rate, filter_sigma = filtered.rate[0, from_second], filtered.rate_sigma[from_second]
     courses += [
         Course("filter", first + filtered.time[from_second], filter_rate, filter_sigma),
-        Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
+        Course("smoother", whole, np.full(2, filter_rate[-1]), np.full(2, filter_sigma[-1])),
     ]
     for method, start in GIVEN.items():
         try:
@@ -122,8 +122,8 @@ def estimate_courses(
         after = settled(tracked.mean, experiment.rate, EARTH_RATE)
         time = tracked.sample / experiment.rate
         courses.append(Course(method, time, tracked.mean, None, settled=after))
-    drift = Course("smoother", first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma)
-    return Courses(tuple(courses), measured, longest, drift)
+    smoothed = Course("smoother", first + blocks.middle, drift[0], drift_sigma)
+    return Courses(tuple(courses), measured, longest, smoothed)
 
 
 def thin(points: int) -> Iterator[int]:
