@@ -204,9 +204,7 @@ def of_budget(runs: int) -> int:
         outcome = drive.repeat(
             {"true": states(noise)}, partial(of_run, drive, noise, "rest"), runs, CORES
         )["true"]
-        size = compute_root_mean_square(
-            compute_mean_squares(drive, outcome, "position", length)
-        ).value
+        size = compute_root_mean_square(compute_mean_squares(drive, outcome, "position", length))[0]
         expected = math.sqrt(float(np.mean(outcome.variances[:, -1, :2].sum(axis=1))))
         started = predicted_by_filter(drive, noise, begin, length)
         window = (

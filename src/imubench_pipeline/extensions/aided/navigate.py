@@ -431,18 +431,13 @@ def _describe_tuning(
     }
     for error in ERRORS:
         of_runs = compute_mean_squares(drive, outcome, error, length)
-        size = compute_root_mean_square(of_runs)
-        row |= {error: size.value, f"{error}_lower": size.lower, f"{error}_upper": size.upper}
+        columns = [f"{error}{end}" for end in ("", "_lower", "_upper")]
+        row |= zip(columns, compute_root_mean_square(of_runs), strict=True)
         row[f"{error}_predicted"] = predict_root_mean_square(drive, outcome, error, length)
         if TRUE in outcomes:
-            against = compute_ratio(
-                of_runs, compute_mean_squares(drive, outcomes[TRUE], error, length)
-            )
-            row |= {
-                f"{error}_ratio": against.value,
-                f"{error}_ratio_lower": against.lower,
-                f"{error}_ratio_upper": against.upper,
-            }
+            others = compute_mean_squares(drive, outcomes[TRUE], error, length)
+            columns = [f"{error}_ratio{end}" for end in ("", "_lower", "_upper")]
+            row |= zip(columns, compute_ratio(of_runs, others), strict=True)
     # A bank of processes has none shorter than an epoch: its states are no true bias.
     of_bank = {quantity_of(c) for c, model in models.items() if "F" in model.name.split("+")}
     for group in GROUPS:

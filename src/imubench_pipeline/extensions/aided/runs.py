@@ -140,13 +140,8 @@ ERRORS = {"position": [0, 1], "velocity": [3, 4], "heading": [8]}
 """Columns of the evaluated errors: horizontal position and velocity, and heading; m, m/s, rad."""
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A value with its 95 % limits."""
-
-    value: float
-    lower: float
-    upper: float
+Interval = tuple[float, float, float]
+"""A value with its 95 % limits, lower and upper."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +200,7 @@ def _compute_interval(value: float, relative: Array) -> Interval:
     runs = len(relative)
     spread = 0.5 * float(relative.std(ddof=1)) / math.sqrt(runs)
     factor = math.exp(float(t.ppf(0.975, runs - 1)) * spread)
-    return Interval(value, value / factor, value * factor)
+    return value, value / factor, value * factor
 
 
 def compute_nees_share(

@@ -62,11 +62,6 @@ def rotation(vector: ArrayLike) -> Array:
     return np.asarray(np.eye(3) + sine_part * across + cosine_part * across @ across)
 
 
-def correct(attitude: Array, psi: Array) -> Array:
-    """Return an attitude, (..., 3, 3), corrected by its error psi, rad, shape (..., 3)."""
-    return np.asarray(rotation(psi) @ attitude)
-
-
 def euler_jacobian(attitude: Array) -> Array:
     """Return d(roll, pitch, heading)/d(psi), shape (3, 3); ValueError if the pitch is +-pi/2."""
     _, pitch, heading = euler_angles(attitude)

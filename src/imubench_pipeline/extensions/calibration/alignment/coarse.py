@@ -36,7 +36,7 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     turns. The block means are of gyros and accelerometers x, y, z, rad/s and m/s^2, shape (..., b,
     6).
     """
-    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+    weighted = _weigh_blocks(positions)
     rate = np.einsum("bij,...bj->...i", weighted, means[..., :3])
     force = np.einsum("bij,...bj->...i", weighted, means[..., 3:])
     return force, rate
@@ -47,7 +47,7 @@ def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array
 
     They are of roll, pitch and heading, rad, shape (3,).
     """
-    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+    weighted = _weigh_blocks(positions)
     of_sensor = []
     for three in (triad.axes[:3], triad.axes[3:]):
         covariance = np.zeros((3, 3))
@@ -67,12 +67,12 @@ def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array
     return np.sqrt(np.diag(euler @ psi @ euler.T))
 
 
-def _compute_weights(positions: Positions) -> Array:
-    """Return block weights with sum 1: dwells equal, blocks of a dwell by their samples."""
+def _weigh_blocks(positions: Positions) -> Array:
+    """Return the matrices of blocks, (b, 3, 3), with weights of sum 1: equal for all dwells."""
     blocks = positions.blocks
     of_dwell = np.bincount(blocks.dwell, weights=blocks.count)
-    dwells_with_samples = np.count_nonzero(of_dwell)
-    return np.asarray(blocks.count / of_dwell[blocks.dwell] / dwells_with_samples)
+    weights = blocks.count / of_dwell[blocks.dwell] / np.count_nonzero(of_dwell)
+    return np.asarray(weights[:, None, None] * positions.of_blocks)
 
 
 def _build_triad(first: Array, second: Array) -> Array:

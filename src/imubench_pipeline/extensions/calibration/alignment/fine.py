@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import (
-    correct,
     cross_matrix,
     euler_jacobian,
+    rotation,
 )
 from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
@@ -111,7 +111,7 @@ class FineAlignment:
         psi = states[:, :, :3]
         white = np.linalg.solve(self._filter.innovation_roots, innovations[..., None])[..., 0]
         return Aligned(
-            correct(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
+            rotation(psi[:, -1]) @ attitudes, psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
 
 
