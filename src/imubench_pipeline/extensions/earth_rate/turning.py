@@ -20,7 +20,6 @@ from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
     list_disturbances,
 )
 from imubench_pipeline.extensions.earth_rate.turns import (
-    CLEAR_LOG_LIKELIHOOD,
     DETECTION_ORDER,
     Event,
     FoundDwell,
@@ -197,7 +196,7 @@ def _find_turns_in_column(
         first, last, peak = float(stop), float(start), None
         for k, event in enumerate(events):
             near = event.stop > stop - 3.0 and event.start < start + 3.0
-            if near and not event.haste and event.likelihood > CLEAR_LOG_LIKELIHOOD:
+            if near and event.is_clear:
                 first, last = min(first, event.start), max(last, event.stop)
                 peak = max(peak or 0.0, event.peak)
                 used.add(k)
