@@ -198,11 +198,8 @@ def _attitude(
             accelerometer_bias=parse_quantity(declared.accelerometer_bias, "acceleration"),
         )
         aligned, fine = align(means, triad, positions, Site(latitude=declared.latitude_si))
-    except NotObservableError as error:
-        yield from without("not_observable", str(error))
-        return
     except ValueError as error:
-        yield from without("too_short", str(error))
+        yield from without(_name_status(error), str(error))
         return
     for name, value, sigma in zip(
         _ANGLES, euler_angles(aligned.attitude[0]).tolist(), fine.sigma[-1].tolist(), strict=True
@@ -312,8 +309,7 @@ def _on_rate_table(
     try:
         fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except ValueError as error:
-        status = "not_observable" if isinstance(error, NotObservableError) else "too_short"
-        yield from _without(row, status, str(error))
+        yield from _without(row, _name_status(error), str(error))
         return
     earth = 0.0 if pointing is None else pointing.rate
     rates = schedule.of_blocks(measured.blocks) + earth
@@ -419,6 +415,10 @@ def _without(row: partial[CalibrationRow], status: str, reason: str) -> Iterator
     """Yield the rows of a run without estimates."""
     for name in _RUN_PARAMETERS[row.keywords["run"]]:
         yield row(status=status, reason=reason, parameter=name, unit=UNITS[name])
+
+
+def _name_status(error: ValueError) -> str:
+    return "not_observable" if isinstance(error, NotObservableError) else "too_short"
 
 
 def _finite(value: float) -> float | None:

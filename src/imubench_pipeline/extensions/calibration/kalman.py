@@ -37,7 +37,6 @@ _SINGULAR_TOLERANCE = (
 class Filtered:
     """Filtered estimates after each block, from the data up to its end."""
 
-    time: Array  # shape (b,); end of each block, s from the first sample of the first
     rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
     rate_sigma: Array  # shape (b,); its standard deviation, rad/s
     drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
@@ -102,7 +101,6 @@ class RateFilter:
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots
         return Filtered(
-            self.blocks.end,
             states[:, :, 0],
             self.rate_sigma,
             states[:, :, -1],

@@ -110,7 +110,7 @@ def estimate_courses(
             courses.append(Course(method, np.empty(0), np.empty(0), np.empty(0), str(error)))
     filter_rate, filter_sigma = filtered.rate[0, from_second], filtered.rate_sigma[from_second]
     courses += [
-        Course("filter", first + filtered.time[from_second], filter_rate, filter_sigma),
+        Course("filter", first + blocks.end[from_second], filter_rate, filter_sigma),
         Course("smoother", whole, np.full(2, filter_rate[-1]), np.full(2, filter_sigma[-1])),
     ]
     for method, start in GIVEN.items():
