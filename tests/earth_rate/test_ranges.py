@@ -82,7 +82,8 @@ def test_a_run_says_how_sure_its_sigma_is(tmp_path: Path) -> None:
             assert row["sigma_lower"] < row["sigma"] < row["sigma_upper"]
         assert rows["known_rate"]["sigma_lower"] is None
         widths.append(rows["filter"]["sigma_upper"] / rows["filter"]["sigma_lower"])
-    assert 1.0 < widths[0] < widths[1] < 4.0
+    # The limits of each parameter are apart by 4 at most; 60 draws give their ends to a fifth.
+    assert 1.0 < widths[0] < widths[1] < 1.2 * 4.0
     plain = run(turned, [put_at_rest(tmp_path / "plain")], asked=asked)["earth_rate"]
     filtered = next(row for row in plain if row["method"] == "filter")
     assert filtered["sigma_lower"] == filtered["sigma_upper"] == pytest.approx(filtered["sigma"])
