@@ -15,7 +15,7 @@ from imubench_pipeline.extensions.aided.axis_states import (
     add_turn_on_bias,
     make_axis_states,
 )
-from imubench_pipeline.extensions.aided.runs import Drive, Outage
+from imubench_pipeline.extensions.aided.runs import Drive
 from imubench_pipeline.extensions.aided.trajectories import (
     Spreads,
     simulate_signals,
@@ -39,7 +39,7 @@ FLICKER = {"gyro": NoiseModel(N=8.4e-5, B=6.7e-5), "accel": NoiseModel(N=9.6e-4,
 PAPERS = {"gyro": GYRO, "accel": ACCEL}
 SPREADS = Spreads(1e-3, 0.02)
 WAY = simulate_trajectory("car", 100.0, RATE)
-DRIVE = Drive(WAY, [Outage(60.0, 30.0)])
+DRIVE = Drive(WAY, [(60.0, 30.0)])
 SIGNALS = simulate_signals(
     WAY,
     {c: SensorModel(noise=PAPERS[c.split("_")[0]]) for c in CHANNELS},
