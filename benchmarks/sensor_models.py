@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from scipy.stats import binomtest
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_estimate
+from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
@@ -359,8 +361,10 @@ def of_model(number: int) -> list[dict[str, object]]:
         again = found.model(made.rate)
         curve_again = curve_of(simulated(made, again, 2, Path(folder)), LONGEST)
         curve_twin = curve_of(simulated(made, made.model, 3, Path(folder)), LONGEST)
-    true_variance = made.model.allan_variance(measured.tau, made.rate)
-    variance = again.allan_variance(measured.tau, made.rate)
+    true_variance, variance = (
+        allan_of_spectrum(partial(each.sampled_spectrum, rate=made.rate), measured.cluster_size)
+        for each in (made.model, again)
+    )
     truths, parameters = true_figures(made, found), found.parameters(made.model.noise)
     drift, low_pass = made.model.drift, made.model.low_pass
     assert drift is not None and low_pass is not None  # every case has them

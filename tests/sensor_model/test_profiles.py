@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.settings.profile_forms import Surroundings
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.simulate.profiles import FileSeries, profiles_of
+from imubench_pipeline.simulate.profiles import profiles_of
 from imubench_pipeline.units import UnitError, parse_difference
 
 
@@ -131,25 +131,6 @@ def test_a_file_is_interpolated_in_blocks_of_any_size(
     wanted = np.interp(times, t, np.radians(v))
     np.testing.assert_allclose(np.concatenate(parts), wanted, atol=1e-11)
     np.testing.assert_allclose(motion["gyro_x"].at(times[:3]), wanted[:3], atol=1e-11)  # back
-
-
-@pytest.mark.release
-def test_a_long_csv_file_is_read_as_a_stream(tmp_path: Path) -> None:
-    path = tmp_path / "long.csv"
-    rows = 300_000
-    t = np.arange(rows) / 100
-    lines = "\n".join(f"{a:.2f},{b:.6f}" for a, b in zip(t, np.sin(t), strict=True))
-    path.write_text(f"time,temperature\n{lines}\n")
-    series = FileSeries(path)
-    series.take("temperature", "temperature")
-    most = 0
-    for begin in range(0, 3000, 100):
-        times = begin + np.arange(0, 100, 0.005)
-        found = series.at("temperature", times)
-        np.testing.assert_allclose(found, np.interp(times, t, np.sin(t)), atol=1e-6)
-        most = max(most, len(series._window["time"]))
-    assert most < 150_000  # of 300,000
-    assert series.span() == (0.0, t[-1])
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import inspect
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
@@ -263,10 +263,6 @@ class Term(ABC):
         The window begins at ``on_time`` after switch-on, s.
         """
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
-
-    def passed(self, power: Callable[[float], Array]) -> float:
-        """Return the part of its Allan variance that a low-pass passes, if it has no `drive`."""
-        return 1.0
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
         """Draw the first state, shape (m,)."""
