@@ -71,8 +71,3 @@ def of_white_mean(order: int, time: float, start: SensorStart) -> float:
     if isinstance(start, Uncalibrated):
         return 0.0
     return of_constant(order, time) ** 2 / start.window
-
-
-def of_walk(order: int, time: float) -> float:
-    """Return t^(2m+3) / ((2m+3) (m+1)!^2), the variance for a random walk with K = 1 from 0."""
-    return of_white(order + 1, time)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,28 +91,20 @@ class Reading:
     peak: bool = False  # the term is nowhere higher
 
 
-class SampleBlocks(Protocol):
-    """Blocks of samples of a log; b is their number."""
+@dataclass(frozen=True, kw_only=True)
+class SampleBlocks:
+    """Blocks of samples of a log; the arrays have the shape (b,)."""
 
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz."""
-
-    @property
-    def start(self) -> NDArray[np.int64]:
-        """First sample of each block, shape (b,)."""
-
-    @property
-    def stop(self) -> NDArray[np.int64]:
-        """One-past-last sample of each block, shape (b,)."""
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of samples present in each block, shape (b,)."""
+    # start, stop: first sample of the log, and the one past the last
+    start: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    count: NDArray[np.int64]  # samples that are present
+    rate: float  # Hz
 
     @property
     def middle(self) -> Array:
-        """Mean time of each block, s from the first sample of the first block."""
+        """Mean time of the samples of each block, s from the first sample, shape (b,)."""
+        return np.asarray((0.5 * (self.start + self.stop - 1) - self.start[0]) / self.rate)
 
 
 @dataclass(frozen=True)
@@ -187,9 +179,13 @@ class Term(ABC):
         s^(2m+2).
         """
 
-    @abstractmethod
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral from a known state; 0 if none."""
+        """Return the variances of its first and second integral from a known state.
+
+        0 by default: it does not grow, a filter with the term predicts it exactly, or there is no
+        finite state that could be known.
+        """
+        return np.zeros_like(time), np.zeros_like(time)
 
     @abstractmethod
     def block_covariance(self, lags: Array, block: float) -> Array:
@@ -294,10 +290,6 @@ class Deterministic(Term):
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
         """0: it has no variance."""
         return np.zeros_like(lags)
-
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return 0: a filter with the term predicts it exactly."""
-        return np.zeros_like(time), np.zeros_like(time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Raise TypeError: it is deterministic (see `swing`)."""

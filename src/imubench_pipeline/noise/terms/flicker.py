@@ -124,13 +124,6 @@ class Flicker(Term):
             return scale * integrate_after_window(order, start.window / time)
         return scale * integrate_since_switch_on(order, start.on_time / time)
 
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: flicker noise has no finite state that could be known.
-
-        A filter predicts with the `fit_flicker_bank`, see `realised`.
-        """
-        return np.zeros_like(time), np.zeros_like(time)
-
     def block_covariance(self, lags: Array, block: float) -> Array:
         """-(B^2 / pi) times the second difference of k^2 (ln k - 3/2) / 2."""
         k = np.maximum(lags, 1.0)
