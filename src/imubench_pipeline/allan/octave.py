@@ -150,7 +150,7 @@ class OctaveSums:
         ]
 
     def _sum(self, sections: int) -> None:
-        """Sum the short clusters that begin in the first sections of the rest; store their phase."""
+        """Sum the short clusters that begin in sections of the rest, and store their phase."""
         samples = self._rest
         if not self._filled:
             self._bias = average_finite(samples[:SECTION_SAMPLES])

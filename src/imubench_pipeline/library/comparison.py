@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.library.shown import cut, summarise
 from imubench_pipeline.navigation import ratios
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings, Method
@@ -48,7 +48,7 @@ class Compared:
         return symbol_text(self.symbol) if self.tau is None else f"σ({self.tau:g} s)"
 
 
-class Comparison(Shown, Sequence[Compared]):
+class Comparison(Sequence[Compared]):
     """Noise parameters and Allan deviations of logs, as ratios with 95 % intervals.
 
     A verdict depends on a single 95 % interval: of twenty comparisons of equal sensors, about one
@@ -105,7 +105,7 @@ class Comparison(Shown, Sequence[Compared]):
             for each in self
         )
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         heads = ["channel", "", "a", "b", "unit", "a / b", "95 % interval", "verdict", "because"]
         several = len(self.names) > 2
         rows = []
@@ -126,7 +126,7 @@ class Comparison(Shown, Sequence[Compared]):
             heads = ["a / b of", *heads]
         a, b, *more = self.names
         title = f"{a} (a) and {b} (b)" if not more else ", ".join(self.names)
-        return Summary(f"Comparison of {title}", heads, rows)
+        return summarise(f"Comparison of {title}", heads, rows)
 
 
 def compare(

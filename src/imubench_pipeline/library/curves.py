@@ -1,7 +1,7 @@
 """Allan curves of logs, arrays and tables, by channel."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,7 +13,7 @@ from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.estimators.rows import make_allan_rows
 from imubench_pipeline.library import given
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.library.shown import Shown, ShownMapping, Summary
+from imubench_pipeline.library.shown import ByChannel, summarise
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.steps.allan import curve_of, report_too_sparse
@@ -32,7 +32,7 @@ _TABLE_COLUMNS = ("tau", "adev", "lower", "upper", "edf", "cluster_size", "avera
 
 
 @dataclass(frozen=True, repr=False)
-class Curve(Shown, AllanCurve):
+class Curve(AllanCurve):
     """An Allan curve with plots and tables.
 
     Attributes
@@ -43,19 +43,13 @@ class Curve(Shown, AllanCurve):
 
     channel: str | None = None
 
-    @classmethod
-    def of(cls, curve: AllanCurve, channel: str | None) -> "Curve":
-        """Return a curve with its channel."""
-        values = {field.name: getattr(curve, field.name) for field in fields(AllanCurve)}
-        return cls(**values, channel=channel)
-
     @property
     def quantity(self) -> str | None:
         """``gyro`` or ``accel``; None: not known."""
         return None if self.channel is None else quantity_of(self.channel)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
+        """Draw the deviation with 95 % limits."""
         from imubench_pipeline.library.drawing import draw_curves, get_axes
 
         axes: Axes = get_axes(ax)
@@ -66,12 +60,12 @@ class Curve(Shown, AllanCurve):
         """Return a row for each tau: deviation, 95 % limits, degrees of freedom; units in attrs."""
         return _make_table([self])
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         title = f"Allan curve{'' if self.channel is None else f' of {self.channel}'}"
-        return Summary(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
+        return summarise(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
 
 
-class Curves(ShownMapping[Curve]):
+class Curves(ByChannel[Curve]):
     """Allan curves by channel, in SI.
 
     Attributes
@@ -100,9 +94,9 @@ class Curves(ShownMapping[Curve]):
         """Return a row for each channel and tau, like the workflow's table ``allan``, in SI."""
         return _make_table(self.values())
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         title = f"Allan curves{f' of {self.name}' if self.name else ''}"
-        return Summary(title, _SUMMARY_HEADS, [_make_row(curve) for curve in self.values()])
+        return summarise(title, _SUMMARY_HEADS, [_make_row(curve) for curve in self.values()])
 
 
 def measured(
@@ -113,7 +107,7 @@ def measured(
     None if too many samples are missing (`imubench_pipeline.steps.allan.report_too_sparse`).
     """
     curve = curve_of(log, sizes, overlap, threads=threads)
-    return Curve.of(curve, log.channel) if len(curve.tau) else None
+    return Curve(**vars(curve), channel=log.channel) if len(curve.tau) else None
 
 
 def _make_row(curve: Curve) -> list[str]:
@@ -236,7 +230,7 @@ def allan_variance(
             segments=segments,
             threads=cores,
         )
-        return Curve.of(curve, channel)
+        return Curve(**vars(curve), channel=channel)
 
     if channels is None and units is None and not given.has_columns(data):
         samples = given.convert_to_numbers(data, "the array")

@@ -55,35 +55,12 @@ def choose_deviation_unit(quantity: str | None) -> Unit:
 
 
 def draw_curves(axes: "Axes", curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
-    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
+    """Draw Allan deviations with their 95 % limits."""
     unit = choose_deviation_unit(quantity)
     looks = cycle(assign_sensor_styles([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
     _format_axes(axes, unit)
-    # The slopes of white noise and of a random walk, through the ends of the first curve.
-    curve = next(iter(curves.values()))
-    level = curve.deviation * unit.per_si
-    limits = axes.get_xlim(), axes.get_ylim()
-    last = max(len(curve.up_to(1.0 / 9.0)) - 1, 0)
-    for place, slope, label in ((0, -0.5, "−1/2"), (last, 0.5, "+1/2")):
-        line = level[place] * (curve.tau / curve.tau[place]) ** slope
-        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
-        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
-        if len(inside):
-            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
-            axes.annotate(
-                label,
-                (curve.tau[at], line[at]),
-                xytext=(-3.0, -3.0),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                color="0.4",
-                fontsize="small",
-            )
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
 
 
 def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
