@@ -1,6 +1,6 @@
 """Result of every estimator: parameters with their status, and their noise model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -116,12 +116,14 @@ class Parameter:
             reason = texts.wide_interval(far / near)
         else:
             reason = texts.interval_with_zero(at_limit=signs == 0)
-        fitted = self.in_model
         # The prior, and not the data, decides how far down such draws reach.
         is_open = signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near
-        lower = 0.0 if is_open else self.lower
-        status: Status = "not_identified"
-        return replace(self, value=None, status=status, reason=reason, lower=lower, fitted=fitted)
+        return replace(self.withheld(reason), lower=0.0 if is_open else self.lower)
+
+    def withheld(self, reason: str) -> "Parameter":
+        """Return the parameter, ``not_identified``, with its value as ``fitted``."""
+        fitted = self.in_model
+        return replace(self, value=None, status="not_identified", reason=reason, fitted=fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +185,14 @@ class Estimate:
         for number, group in [*groups, *enumerate(self.lines, start=1)]:
             for name, parameter in group.items():
                 yield number, name, parameter
+
+    def revised(self, change: Callable[[str, Parameter], Parameter]) -> "Estimate":
+        """Return the estimate with changed parameters of the first component and of the curve."""
+        parameters, curve = (
+            {name: change(name, each) for name, each in group.items()}
+            for group in (self.parameters, self.curve)
+        )
+        return replace(self, parameters=parameters, curve=curve)
 
     @property
     def model(self) -> NoiseModel:

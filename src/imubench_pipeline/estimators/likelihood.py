@@ -205,32 +205,22 @@ def fit_spectrum(
     gauss_markov = of_papers.estimate("likelihood_gm")
     noise = frame.whittle(spectrum, all_bins=True).density(chosen.maximum)
     fitted = noise * frame.gain + chosen.maximum.ramp**2 * spectrum.ramp
-    doubt = None
-    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
-        names = chosen.terms.name, papers.terms.name
-        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
     sinusoids = select_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
     parameters = {name: gauss_markov.parameters[name] for name in PARAMETERS}
-    gauss_markov = replace(
-        gauss_markov,
-        parameters=_cast_doubt(parameters, doubt),
-        curve=_cast_doubt(gauss_markov.curve, doubt),
-        lines=sinusoids,
-        draws=of_papers.draw_jointly(),
-    )
+    draws = of_papers.draw_jointly()
+    gauss_markov = replace(gauss_markov, parameters=parameters, lines=sinusoids, draws=draws)
+    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
+        names = chosen.terms.name, papers.terms.name
+        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
+
+        def cast_doubt(name: str, each: Parameter) -> Parameter:
+            is_doubted = each.status == "ok" and name != "N"
+            return replace(each, status="doubtful", reason=doubt) if is_doubted else each
+
+        gauss_markov = gauss_markov.revised(cast_doubt)
     both, lines, used = (estimate, gauss_markov), frame.lines, frame.used
     return Likelihood(both, candidates, lines, frame.band, spectrum, used, fitted, frame)
-
-
-def _cast_doubt(group: Mapping[str, Parameter], reason: str | None) -> dict[str, Parameter]:
-    """Return parameters, all but N of status ``ok`` made doubtful if there is a reason."""
-    return {
-        name: replace(each, status="doubtful", reason=reason)
-        if reason is not None and each.status == "ok" and name != "N"
-        else each
-        for name, each in group.items()
-    }
 
 
 class _InTheLog:
