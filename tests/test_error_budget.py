@@ -15,10 +15,11 @@ from scipy.special import ndtri
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget, time_until
+from imubench_pipeline.navigation.error_budget.budget import Start, budget, time_until
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Quantity
-from imubench_pipeline.navigation.error_budget.uncertainty import compute_interval, draw_models
+from imubench_pipeline.navigation.error_budget.uncertainty import compute_limits, draw_models
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.words.verdicts import source_text
@@ -108,9 +109,10 @@ def test_more_noise_is_never_better(
 
 
 def test_a_levelled_tilt_is_the_mean_error_of_the_accelerometer_over_g() -> None:
-    start = Start.calibrated(25.0, tilt=Levelled(bias=0.03))
+    start = Start.calibrated(25.0)
     accel = NoiseModel(N=1e-3)
-    found = budget("attitude", 10.0, gyro=NOTHING, accel=accel, start=start)
+    biased: Figures = {"turn_on_bias": Figure(sigma=0.03)}
+    found = budget("attitude", 10.0, gyro=NOTHING, accel=accel, start=start, accel_figures=biased)
     sigma = {source_text(one.source): one.sigma for one in found.contributions}
     assert sigma == {
         "initial tilt from accel N": pytest.approx(1e-3 / 5.0 / G),
@@ -198,11 +200,9 @@ def test_bad_starts_are_refused() -> None:
     with pytest.raises(ValueError, match="on_time"):
         uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=-1.0)
     with pytest.raises(ValueError, match="tilt"):
-        Start.calibrated(1.0, tilt=-0.1)
-    with pytest.raises(ValueError, match="bias"):
-        Levelled(bias=math.nan)
+        uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=1.0, tilt=-0.1)
     with pytest.raises(ValueError, match="levelled"):
-        Start(gyro=Calibrated(1.0), accel=Uncalibrated(bias=0.0, on_time=0.0), tilt=Levelled())
+        Start(gyro=Calibrated(1.0), accel=Uncalibrated(bias=0.0, on_time=0.0), tilt=None)
 
 
 # Errors in the horizontal plane
@@ -437,14 +437,6 @@ def test_the_interval_of_a_budget() -> None:
     start = Start.calibrated(10.0)
     budgets = [budget("heading", 5.0, gyro=m, accel=NOTHING, start=start) for m in models]
     best = budget("heading", 5.0, gyro=estimate.model, accel=NOTHING, start=start).total
-    lower, upper = compute_interval(budgets)
+    lower, upper = compute_limits([each.total for each in budgets], best)
     assert lower == pytest.approx(0.8 * best, rel=0.03)
     assert upper == pytest.approx(1.5 * best, rel=0.03)
-
-
-def test_budgets_that_do_not_go_together_have_no_interval() -> None:
-    one = Budget(1.0, "velocity", [Contribution(ErrorSource("N", "gyro"), 1.0)])
-    other = Budget(1.0, "position", [Contribution(ErrorSource("N", "gyro"), 1.0)])
-    for budgets in ([], [one, other]):
-        with pytest.raises(ValueError, match="one quantity"):
-            compute_interval(budgets)

@@ -64,6 +64,8 @@ class AxisErrors:
         return AxisErrors(self.model)
 
 
+_TAIL = (1.0 - 0.95) / 2.0  # probability beyond each 95 % limit
+
 _NO_AXIS_ERRORS = AxisErrors()
 _NO_ERRORS = {"gyro": _NO_AXIS_ERRORS, "accel": _NO_AXIS_ERRORS}
 
@@ -258,9 +260,8 @@ def list_error_rows(
         nominal, noise, likely, best = question.answer_all(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        lower, upper = uncertainty.compute_interval(budgets)
-        # Draws of an absent term are above 0: extend the limits to the value.
-        lower, upper = min(lower, nominal.total), max(upper, nominal.total)
+        totals = [each.total for each in budgets]
+        lower, upper = uncertainty.compute_limits(totals, nominal.total, _TAIL)
         used = [channel for channel in chosen.values() if channel]
         apart = [channel for channel in used if estimates[channel].draws is None]
         reasons = (
@@ -403,7 +404,6 @@ def _find_reason(estimate: Estimate) -> str | None:
 
 _STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
 
 def list_growth_rows(
@@ -481,9 +481,7 @@ def list_growth_rows(
             sure = math.fsum(
                 part.sigma**2 for part in budget.contributions if not part.source.is_noise
             )
-            ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
-            # Draws of an absent term are above 0: extend the limits to the value.
-            lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
+            lower, upper = uncertainty.compute_limits(np.sqrt(drawn + sure), budget.total)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield row(**asdict(part.source), sigma=part.sigma)

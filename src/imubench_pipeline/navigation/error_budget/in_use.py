@@ -28,6 +28,7 @@ from pydantic import TypeAdapter
 from imubench_pipeline.datasheets.class_limits import STATEMENTS, find_limit, read_sigma
 from imubench_pipeline.datasheets.printed_noise import End
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause, Measured, Origin, SourcePath
 from imubench_pipeline.navigation.error_budget.turns import Turn
@@ -220,8 +221,6 @@ def list_turn_levers(
             yield from _list_scale_factors(abs(across), use, "turn")
             yield "g_sensitivity", speed * abs(across), "turn"
 
-
-SIGMAS = 1.96  # half the width of a 95 % interval
 
 _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
     "sensitivity": "temperature",
