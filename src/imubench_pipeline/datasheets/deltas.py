@@ -310,14 +310,8 @@ def curve_rms(
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
     line is used alone. A density of unknown sidedness gives two curves. Typical figures are
     preferred. ``printed``: figures of a channel; ``tau`` and ``adev``, shape (m,): s, and measured
-    Allan deviation, rad/s or m/s². Raises ValueError if the shapes differ, or a deviation is not
-    above 0.
+    Allan deviation above 0, rad/s or m/s².
     """
-    if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
-        raise ValueError(
-            f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
-            "many, and deviations above 0"
-        )
     noises: list[Comparable | None] = [*_select_typical(printed, "N")]
     floors: list[Comparable | None] = [*_select_typical(printed, "adev_minimum")]
     distances = []

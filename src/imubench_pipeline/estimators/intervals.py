@@ -47,14 +47,9 @@ def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
 
 
 def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
-    """Return the bins of a gapless log of a duration, up to a frequency, without data.
-
-    Raises ValueError if no ordinate lies below the frequency.
-    """
+    """Return the bins of a gapless log of a duration, up to a frequency, without data."""
     samples = math.floor(rate * duration + 1e-6)
     count = min(math.floor(2.0 * highest * duration + 1e-6), samples - 1)
-    if count < 1:
-        raise ValueError(f"a log of {duration:.3g} s has no ordinate up to {highest:.3g} Hz")
     edges = list(range(1, min(SINGLE, count) + 1))
     while edges[-1] < count:
         edges.append(min(max(edges[-1] + 1, int(edges[-1] * WIDTH)), count))

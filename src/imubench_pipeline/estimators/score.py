@@ -65,14 +65,8 @@ def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
     """Score a model against a measured curve.
 
     ``measured``, rad/s or m/s², its relative standard ``error``, and ``model`` are Allan
-    deviations, shape (m,); ``draws``, shape (k, m), are of simulated logs. Raises ValueError if the
-    shapes differ.
+    deviations, shape (m,); ``draws``, shape (k, m), are of simulated logs.
     """
-    if not measured.shape == error.shape == model.shape == draws.shape[1:]:
-        raise ValueError(
-            f"shapes differ: measured {measured.shape}, error {error.shape}, model {model.shape}, "
-            f"draws {draws.shape}"
-        )
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

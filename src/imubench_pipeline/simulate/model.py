@@ -230,11 +230,7 @@ def fit_density_bank(B: float, lowest: float, highest: float) -> list[GaussMarko
 
     The variances are fitted by non-negative least squares of the relative error. B is the bias
     instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
-
-    Raises ValueError if the band is empty.
     """
-    if not 0 < lowest < highest:
-        raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
     times, variances = _fit_unit_bank(round(math.log10(highest / lowest), 6))
     processes = []
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):

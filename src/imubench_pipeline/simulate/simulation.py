@@ -254,12 +254,12 @@ class _Axis:
         size = stop - start
         entering = np.full(size, model.bias)
         if true is not None:
-            entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), size, "motion")
+            entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), "motion")
         if model.noise.R:
             entering += model.noise.R / rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
-            temperatures = _check_signal(temperature(start, stop), size, "temperature")
+            temperatures = _check_signal(temperature(start, stop), "temperature")
         normal = self._noise.standard_normal((size, len(self._x) + max(len(self._e), 1)))
         log = np.empty(size)
         states = (self._memory, self._x, self._e)
@@ -283,10 +283,8 @@ class _Axis:
         return log
 
 
-def _check_signal(values: Array, size: int, what: str) -> Array:
+def _check_signal(values: Array, what: str) -> Array:
     signal = np.ascontiguousarray(values, dtype=np.float64)
-    if signal.shape != (size,):
-        raise ValueError(f"{what} has shape {signal.shape}, expected ({size},)")
     if not np.isfinite(signal.sum()):
         raise ValueError(f"{what} has values that are not finite")
     return signal

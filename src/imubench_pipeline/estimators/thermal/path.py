@@ -344,10 +344,8 @@ def apply_lag(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
     Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
-    equilibrium at the first. Raises ValueError if the lag, s, is below 0 or not finite.
+    equilibrium at the first. The lag is in s, from 0.
     """
-    if not (lag >= 0.0 and math.isfinite(lag)):
-        raise ValueError(f"the lag is {lag} s, expected a time from 0")
     values = np.asarray(values, dtype=np.float64)
     if lag == 0.0:
         return values.copy()

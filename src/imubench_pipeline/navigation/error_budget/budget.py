@@ -52,8 +52,6 @@ class Start:
 
     A levelled tilt is the mean error of the accelerometers over their static window, over g. It
     cancels that error, so only the later departure from it has an effect on velocity and position.
-    A ValueError is raised if an angle is negative or not finite, or the tilt is levelled by
-    accelerometers that are not calibrated.
     """
 
     gyro: SensorStart
@@ -62,11 +60,6 @@ class Start:
     # source that is independent of the calibration of the accelerometers
     tilt: float | None = 0.0
     heading: float = 0.0  # initial heading error, 1 sigma, rad
-
-    def __post_init__(self) -> None:
-        in_use.check_not_negative(heading=self.heading, tilt=self.tilt or 0.0)
-        if self.tilt is None and not isinstance(self.accel, Calibrated):
-            raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
     @classmethod
     def calibrated(cls, window: float) -> "Start":
@@ -96,7 +89,7 @@ def budget(
 
     The time t is in s. The gyro is across the axis, or for the heading points up; the accelerometer
     is along the axis, and the heading does not need it. The figures of these axes are other than
-    noise. Raise a ValueError if the quantity is not known, or the time is not above 0.
+    noise.
 
     References
     ----------
@@ -104,10 +97,6 @@ def budget(
     2nd ed., Artech House 2013; D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
     Technology", 2nd ed., IEE 2004.
     """
-    if quantity not in get_args(parts.Quantity):
-        raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(parts.Quantity)}")
-    if not (math.isfinite(time) and time > 0):
-        raise ValueError(f"time is {time}, expected a time above 0")
     order = GYRO_ORDER[quantity]
     factor = _get_factor(quantity, use)
     contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, factor))
@@ -195,10 +184,7 @@ def time_until(
     negative correlation. With lines or turns it may oscillate; if ``oscillates``, as with lines,
     the first crossing is found among 4096 times. The time is in s: 0 if the error exceeds the limit
     from the beginning, None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m.
-    Raise a ValueError if the limit is not above 0.
     """
-    if not (math.isfinite(limit) and limit > 0):
-        raise ValueError(f"limit is {limit}, expected a number above 0")
 
     def excess(time: float) -> float:
         return at(time).total - limit
