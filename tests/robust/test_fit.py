@@ -204,3 +204,16 @@ def test_hidden_white_noise_has_an_upper_limit() -> None:
     found = estimate(simulate_gyro(5, NoiseModel(N=1e-6, K=1e-3))).parameters["N"]
     assert (found.value, found.status) == (None, "not_identified")
     assert found.upper is not None and found.upper > 1e-6
+
+
+@pytest.mark.parametrize("seed", [42, 54])
+def test_k_lies_within_its_limits_where_it_exceeds_what_the_end_of_the_curve_allows(
+    seed: int,
+) -> None:
+    model = NoiseModel(N=7e-5, B=3e-5, T_B=85.0, K=3e-6)
+    log = simulate(model, 4.0, SAMPLES, np.random.default_rng(seed))
+    curve = of_blocks([log], len(log), 4.0, holes=False)
+    parts = compute_part_variances([log], curve, holes=False)
+    K = fit(curve, parts, (), rng=np.random.default_rng(0)).parameters["K"]
+    assert K.value is not None and K.lower is not None and K.upper is not None
+    assert K.lower < K.value <= K.upper

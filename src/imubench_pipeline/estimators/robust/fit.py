@@ -489,7 +489,7 @@ def _limit(
 ) -> Parameter:
     """Return a parameter with the limits of its draws; without a value where they are too wide."""
     lower, upper = np.quantile(draws, (0.025, 0.975), method="nearest").tolist()
-    lower, upper = min(lower, value), min(max(upper, value), most)
+    lower, upper = min(lower, value), max(min(upper, most), value)
     if not np.isfinite(upper):  # some draws have no process
         return Parameter(None, "not_identified", texts.MAY_BE_ABSENT, lower, None, fitted=value)
     if value == 0.0:
