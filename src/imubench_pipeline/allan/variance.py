@@ -263,10 +263,7 @@ def of_phase(
     gaps: Gaps = NO_GAPS,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`).
-
-    The result has the same bits for any number of threads.
-    """
+    """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`)."""
     wanted = _check_arguments(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 

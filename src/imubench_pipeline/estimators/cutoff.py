@@ -219,10 +219,7 @@ class _Fits:
         )
 
     def try_filters(self) -> list[_Trial]:
-        """Return the maxima of the likelihood over all filters, sorted by BIC, best first.
-
-        A floor is tried only where no filter explains the spectrum without one.
-        """
+        """Return the maxima over all filters by BIC, best first; with a floor if none explains."""
         maxima: list[_Trial] = []
         for with_floor in (False, True):
             for each in _MAX_CUTOFFS:

@@ -102,10 +102,7 @@ class Curves(ByChannel[Curve]):
 def measured(
     log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int
 ) -> Curve | None:
-    """Return the curve of a channel of a log at cluster sizes, shape (m,), or at the default ones.
-
-    None if too many samples are missing (`imubench_pipeline.steps.allan.report_too_sparse`).
-    """
+    """Return the curve at cluster sizes of shape (m,); None if too many samples are missing."""
     curve = curve_of(log, sizes, overlap, threads=threads)
     return Curve(**vars(curve), channel=log.channel) if len(curve.tau) else None
 

@@ -280,10 +280,7 @@ def read_log(
 
 
 def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples at a rate, Hz, as a log of this name, ingested like a file with all checks.
-
-    Raises RecordingError if no channel can be used.
-    """
+    """Return samples at a rate, Hz, as a log; raises RecordingError if no channel can be used."""
     if not name or Path(name).name != name:
         raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")
     channels, temperature = {}, None

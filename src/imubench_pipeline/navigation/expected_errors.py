@@ -161,10 +161,7 @@ _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield the standard questions, which are computed for every recording.
-
-    ``times`` and the static window are in s, the latitude for north in rad.
-    """
+    """Yield the standard questions; times and window in s, the latitude for north in rad."""
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
     for axis in axes:

@@ -189,11 +189,7 @@ class Conditions:
     def of(
         cls, requirement: Requirement, has: Abilities, conditions: Iterable[ErrorBudgetRow]
     ) -> "Conditions":
-        """Return the conditions of the verdict on a sensor.
-
-        ``has`` are the properties of the sensor; ``conditions`` the rows of the table
-        ``error_budget`` whose class limits are too large.
-        """
+        """Return the conditions; ``conditions``: budget rows with too large class limits."""
         lacking, unknown = judge(requirement, has)
         largest = merge_largest((row.quantity, row.source, row.largest) for row in conditions)
         return cls(tuple(lacking), tuple(unknown), largest)

@@ -53,10 +53,7 @@ class Sources:
     densities: Array
 
     def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities, (n,), with the processes that approximate flicker noise.
-
-        The sampling interval and the longest requested time are in s.
-        """
+        """Return times and densities, (n,), with flicker noise as processes; arguments in s."""
         if self.flicker == 0.0:
             return self.times, self.densities
         # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
@@ -72,10 +69,7 @@ class Sources:
 def compute_sampled_spectrum(
     sources: Sources, low_pass: LowPass, omega: Array, rate: float
 ) -> Array:
-    """Return the spectrum of the samples, SI^2, in the shape of omega, rad/sample, not 0.
-
-    The rate is in Hz.
-    """
+    """Return the spectrum of samples at a rate, Hz, SI^2, in the shape of omega, rad/sample."""
     interval = 1.0 / rate
     flat = np.ravel(omega)
     lowest = float(np.abs(flat).min(initial=math.pi))
@@ -177,11 +171,7 @@ class SensorModel:
 
 
 def sources_of(terms: Sequence[Term]) -> Sources:
-    """Return the noise terms at the input of a filter.
-
-    These are white and flicker noise, Gauss-Markov processes and random walks; others have no
-    density.
-    """
+    """Return the noise terms at the input of a filter; those without a density are left out."""
     drives = drives_of(terms)
     slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
     times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T

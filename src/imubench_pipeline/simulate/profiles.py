@@ -241,11 +241,7 @@ class FileColumn(Profile):
 def profiles_of(
     around: profile_forms.Surroundings, folder: Path
 ) -> tuple[dict[str, Profile], Profile | None]:
-    """Return motion by channel, and temperature, in SI; file names are relative to a folder.
-
-    Raises ConfigError if a file cannot be used. Raises UnitError if a unit has another dimension
-    than its profile.
-    """
+    """Return motion by channel, and temperature, in SI; raises ConfigError and UnitError."""
     opened: dict[Path, FileSeries] = {}
     motion = {
         str(channel): make_profile(form, channel, folder, opened)

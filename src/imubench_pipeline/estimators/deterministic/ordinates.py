@@ -161,10 +161,7 @@ class Ordinates:
         return np.exp(np.interp(np.log(self.frequency), np.log(bins), logarithm))
 
     def fit(self, regressors: Sequence[Regressor], start: Array | None = None) -> Fit:
-        """Fit noise and regressors together.
-
-        ``start``, shape (k,), is the noise density for the weights of the first iteration.
-        """
+        """Fit noise and regressors; ``start``, shape (k,), is the density for the first weights."""
         residual, leverage = self.coefficient, np.zeros_like(self.coefficient)
         density = start
         for _ in range(_FIT_ROUNDS if regressors else 1):
@@ -211,10 +208,7 @@ class Ordinates:
 
 
 def solve_weighted(columns: Array, weight: Array, coefficient: Array) -> tuple[Array, Array, Array]:
-    """Return the amplitudes of columns, shape (p, k), by weighted least squares.
-
-    Beside them are their covariance, and the weighted products of columns and coefficients.
-    """
+    """Return amplitudes of columns (p, k), their covariance, and products with coefficients."""
     weighted = columns * weight
     gram = weighted @ columns.T
     norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))

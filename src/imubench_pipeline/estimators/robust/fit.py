@@ -251,10 +251,7 @@ def _fit_points(points: _Points) -> _Fitted:
 def _choose_correction(
     points: _Points, curves: Array, weights: Array, plain: Solutions
 ) -> tuple[Solutions, NDArray[np.bool_]]:
-    """Return the fits to curves with the correction of the short end, and which are better.
-
-    ``plain``: the fits without.
-    """
+    """Return fits with the correction of the short end, and which are better than ``plain``."""
     column, image, free = _leave_out_correction(points, weights)
     bent = points.search.solve(curves, free)
     of_bent = [

@@ -67,10 +67,7 @@ class Posterior:
 
 
 class Regression:
-    """The ordinates of a log, and of its temperature at any lag.
-
-    ``rate`` is the rate of the log, Hz.
-    """
+    """The ordinates of a log at a rate, Hz, and of its temperature at any lag."""
 
     def __init__(self, ordinates: Ordinates, path: TemperaturePath, rate: float) -> None:
         self.ordinates, self.path, self.rate = ordinates, path, rate
@@ -147,10 +144,7 @@ class Regression:
         return self.ordinates.fit_noise(self.ordinates.coefficient)
 
     def fit(self, shape: Shape, lags: Array) -> Effect:
-        """Return a fit by turns of effect and noise.
-
-        ``lags``, shape (l,): the lags that are tried, s.
-        """
+        """Return a fit by turns of effect and noise, at the best of lags, shape (l,), s."""
         density = self.plain[1]
         for _ in range(_ROUNDS):
             gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]

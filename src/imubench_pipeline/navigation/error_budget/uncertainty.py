@@ -15,10 +15,7 @@ from imubench_pipeline.typing import Array
 def compute_limits(
     drawn: Sequence[float] | Array, value: float, tail: float = 0.025
 ) -> tuple[float, float]:
-    """Return the 95 % limits of a total over drawn noise models; the value lies inside.
-
-    Draws of an absent term are above 0, so that the value may be below all of them.
-    """
+    """Return 95 % limits of draws, extended to the value: draws of an absent term exceed it."""
     lower, upper = np.quantile(drawn, [tail, 1.0 - tail]).tolist()
     return min(lower, value), max(upper, value)
 

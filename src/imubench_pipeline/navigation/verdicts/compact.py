@@ -89,10 +89,7 @@ def pack_channels(
     seed: int,
     most: int | None = None,
 ) -> list[Packed]:
-    """Return the channels of a recording; the arguments are as of `list_error_rows`.
-
-    ``most`` is the maximum number of drawn models that are packed.
-    """
+    """Return the channels of a recording (see `list_error_rows`), with ``most`` draws at most."""
     packed = []
 
     def pack_figure(cause: Cause, every: Sequence[AxisErrors]) -> list[Any]:

@@ -116,11 +116,7 @@ def list_standings(
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
-    """Return the standing of one sensor for each limit of one requirement.
-
-    The arguments are rows of the table ``error_budget``, the specimen of each recording, and the
-    spread of other sensors by `make_limit_key`.
-    """
+    """Return the standing of one sensor for each limit; ``usual`` is by `make_limit_key`."""
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
         if row.source == "total":

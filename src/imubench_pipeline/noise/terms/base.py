@@ -152,11 +152,7 @@ class Term(ABC):
 
     @abstractmethod
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Generalised covariance of the cumulative sum of the samples at whole lags, SI^2.
-
-        For second differences at n samples a cluster: a constant and a square of the lag may
-        differ.
-        """
+        """Covariance of sums of samples at lags, SI^2, up to a constant and a square of the lag."""
 
     @abstractmethod
     def state_space(self, interval: float) -> StateSpace:
@@ -254,10 +250,7 @@ class Term(ABC):
         yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over a window of length ``time``, (rad/s)^2 or (m/s^2)^2.
-
-        The window begins at ``on_time`` after switch-on, s.
-        """
+        """Return the variance of its mean over ``time`` from ``on_time`` since switch-on, s."""
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
@@ -273,10 +266,7 @@ class Deterministic(Term):
 
     @abstractmethod
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return the mean square and the frequency, Hz, of a weighted sum of adjacent block means.
-
-        ``block`` is the length of a block, s.
-        """
+        """Return mean square and frequency, Hz, of a weighted sum of means over blocks, s."""
 
     @property
     def drive(self) -> Drive | None:
