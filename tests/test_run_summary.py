@@ -99,13 +99,13 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     recordings = [RecordingRow(**recording("best")),
                   RecordingRow(**recording("made", simulated=True))]  # fmt: skip
     assert list(list_best_sensors(ranking, recordings)) == [
-        "robot: best meets the limits. Best of 2 sensors (weak evidence: one specimen). "
+        "robot: best meets the limits. Best of 2 sensors (weak evidence: only one specimen). "
         "The difference from other is not significant.",
         "hard: No sensor meets the limits. made (simulated) is closest, but fails. "
         "Only sensor with usable data.",
         "vague: No sensor is shown to meet the limits. short is closest, but there is not enough "
         "data. Only sensor with usable data.",
-        "dear: No sensor has the demanded properties and usable data.",
+        "dear: No sensor has the required properties and usable data.",
     ]
 
 

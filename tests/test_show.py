@@ -150,8 +150,8 @@ def test_terminal_shows_weak_evidence_corrected_verdicts_and_next_steps(
         "third: step 0 (robot) third: step 1 (robot) third: step 2 (robot)"
     )
     ranking = after(text, "Ranking for robot")
-    for part in ("weak evidence: one specimen", "it meets the limits (margin 7.5)",
-                 "if the gyro data are in °/s, not", "rad/s"):  # fmt: skip
+    for part in ("weak evidence: only one specimen", "meets the limits (margin 7.5)",
+                 "the gyro data in °/s, not rad/s"):  # fmt: skip
         assert part in ranking
 
 

@@ -100,9 +100,9 @@ def test_published_figures_are_counted_by_figure() -> None:
         *covered("c", {"N": "no", "offset": "not looked up"}, quantity="accel"),
     )
     gyro, accel = make_catalogue_tables(rows, [], "practical")
-    assert gyro["counts"] == ["2 of 3 looked up", "2 of 2 looked up; 1 others not"]
+    assert gyro["counts"] == ["2 of 3", "2 of 2; 1 not looked up"]
     assert [line["name"] for line in gyro["lines"]] == ["u A", "V B", "V C"]
-    assert accel["counts"] == ["0 of 1 looked up", "0 of 0 looked up; 1 others not"]
+    assert accel["counts"] == ["0 of 1", "0 of 0; 1 not looked up"]
     assert list(make_catalogue_tables([], [], "practical")) == []
 
 
@@ -112,5 +112,8 @@ def test_the_claim_of_the_paper_has_the_numbers_of_the_catalogue() -> None:
         *covered("b", {"N": "yes", "B": "no", "K": "no", "T_B": "not looked up"}),
     )
     text = compare_with_paper(rows)
-    assert "1 of 2 gyroscopes and accelerometers have all of N, B, K and T_B published" in text
-    assert "(N for 2 of 2, B for 1 of 2, K for 1 of 2 and T_B for 1 of 1 that were" in text
+    assert (
+        "1 of the 2 gyroscopes and accelerometers below have all of N, B, K and T_B published"
+        in text
+    )
+    assert "2 of 2 print N, 1 of 2 print B, 1 of 2 print K and 1 of 1 print T_B." in text

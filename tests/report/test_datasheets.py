@@ -47,7 +47,7 @@ def test_a_printed_figure_stands_beside_what_was_measured() -> None:
     assert row["printed"] == "0.3 deg/sqrt(h)"
     assert row["about"] == "typ, 25 °C"
     (reading,) = row["readings"]
-    assert reading["as"] == "read as one-sided"
+    assert reading["as"] == "if one-sided"
     assert (reading["comparable"], reading["unit"]) == ("0.3", "°/√h")
     assert reading["measured"] == ["0.33", "0.3 to 0.36"]
     assert reading["delta"] == ["+10 %", "+0 % to +20 %"]
@@ -62,15 +62,15 @@ def test_a_printed_figure_has_one_verdict_however_it_is_read() -> None:
     (row,) = deltas(one, two)
     assert row["verdict"] == "as printed" and len(row["readings"]) == 2
     (row,) = deltas(one, two | {"verdict": "better than typ"})
-    assert row["verdict"] == "depends on sidedness"
+    assert row["verdict"] == "depends on whether the density is one-sided"
     assert row["reason"] == "as one-sided: as printed; as two-sided: better than typ"
-    # What vendors print as the bias instability is the lowest point of the curve.
+    # What vendors print as the bias instability is the lowest point.
     instability = FIGURE | {"quantity": "bias_instability", "statistic": "adev_minimum"}
     (row,) = deltas(instability, instability | {"statistic": "plateau", "verdict": "not sure"})
     assert row["verdict"] == "as printed"
     assert [reading["as"] for reading in row["readings"]] == [
-        "lowest point of the curve",
-        "0.664 B alone",
+        "if minimum of σ(τ)",
+        "if 0.664 B",
     ]
 
 
@@ -165,10 +165,10 @@ def test_both_readings_of_a_density_stand_in_one_line() -> None:
     other = {"sidedness": "two-sided", "delta": -0.2, "verdict": "better than typ"}
     found = views(with_figures(FIGURE | {"sidedness": "one-sided"}, FIGURE | other))
     (row,) = compare_sensors_with_datasheets(found, "practical")
-    assert (row["about"], row["verdicts"]) == ("typ", "depends on sidedness")
+    assert (row["about"], row["verdicts"]) == ("typ", "depends on whether the density is one-sided")
     assert [(one["as"], one["difference"]) for one in row["readings"]] == [
-        ("read as one-sided", "+10 %"),
-        ("read as two-sided", "−20 %"),
+        ("if one-sided", "+10 %"),
+        ("if two-sided", "−20 %"),
     ]
 
 

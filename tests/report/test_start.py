@@ -14,7 +14,9 @@ from imubench_pipeline.tables.files import build
 from tests.report.tables import ROBOT
 
 NAMES = {name: name.upper() for name in "abc"}
-LIMIT = "Deciding limit, heading, 100 s: 0.29 ° expected (0.23 to 0.34), 0.573 ° allowed (1σ)."
+LIMIT = (
+    "Deciding limit: heading, 100 s. Expected error 0.29 ° (0.23 to 0.34), allowed 0.573 ° (1σ)."
+)
 DATA = "Data: one recording, r (2 h, 1 axis); other units may differ."
 
 
@@ -77,8 +79,8 @@ def test_sensors_that_are_not_worse_are_named() -> None:
     )
     assert lines[1:] == [
         "The difference from B and C is not statistically significant.",
-        "Also meet the limits: B.",
-        "Likely meet the limits: C.",
+        "Also meets the limits: B.",
+        "Likely meets the limits: C.",
     ]
 
 
@@ -100,16 +102,16 @@ def test_a_verdict_that_a_corrected_unit_changes_is_said() -> None:
             corrected_units=(UnitFactor("gyro", 0.017453292519943295),)),
     )  # fmt: skip
     assert lines[1:] == [
-        "Not enough data (no data): B.",
-        "B: as logged it fails (margin 0.1); "
-        "it meets the limits (margin 7) if the gyro data are in °/s, not rad/s.",
+        "Not enough data: B (no data).",
+        "B fails (margin 0.1) as logged; "
+        "meets the limits (margin 7) with the gyro data in °/s, not rad/s.",
     ]
 
 
 def test_where_no_sensor_can_be_ranked_none_is_the_best() -> None:
     excluded = row("a", verdict="excluded", **UNKNOWN)
     answer, lines = said(excluded)
-    assert answer == "No sensor has the demanded properties and usable data."
+    assert answer == "No sensor has the required properties and usable data."
     assert lines == ["Excluded: A."]
     answer, _ = said(row("b", verdict="not_enough_data", **UNKNOWN), row("a"))
     assert answer == "A meets the limits. Only sensor with usable data."

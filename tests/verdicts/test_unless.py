@@ -33,10 +33,10 @@ def test_corrected_verdict_equals_verdict_in_the_right_unit() -> None:
         assert row["logged_verdict"] == "fails"
         assert row["logged_margin"] == pytest.approx(true["margin"] / DEGREES, rel=0.1)
         assert row["corrected_units"] == [{"quantity": "gyro", "factor": 1 / DEGREES}]
-        outcome = {"fails": "still fails", "meets": "meets the limits"}[true["verdict"]]
+        outcome = {"fails": "also fails", "meets": "meets the limits"}[true["verdict"]]
         assert words(row) == (
-            f"as logged it fails (margin {row['logged_margin']:.3g}); it {outcome} "
-            f"(margin {true['margin']:.3g}) if the gyro data are in °/s, not rad/s"
+            f"fails (margin {row['logged_margin']:.3g}) as logged; {outcome} "
+            f"(margin {true['margin']:.3g}) with the gyro data in °/s, not rad/s"
         )
     assert {row["corrected_verdict"] for row in rows} > {"fails"}
 
@@ -44,7 +44,7 @@ def test_corrected_verdict_equals_verdict_in_the_right_unit() -> None:
 def test_verdict_text_has_the_corrected_unit() -> None:
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
     assert rows[0]["verdict"] == "fails"
-    expected = "it meets the limits (margin 7.5) if the gyro data are in °/s, not rad/s"
+    expected = "meets the limits (margin 7.5) with the gyro data in °/s, not rad/s"
     assert words(rows[0]) == expected
     assert (rows[0]["corrected_verdict"], rows[0]["logged_verdict"]) == ("meets", None)
     quiet = [doubt("s", "r", "suspicious_unit", factor=DEGREES)]
@@ -59,8 +59,7 @@ def test_a_failure_that_a_unit_would_lift_may_leave_another_limit_open() -> None
     assert rows[0]["corrected_margin"] is None
     assert rows[0]["corrected_reasons"] == ["the recording has no accelerometer"]
     assert words(rows[0]) == (
-        "it cannot be judged if the gyro data are in °/s, not rad/s "
-        "(the recording has no accelerometer)"
+        "cannot be judged with the gyro data in °/s, not rad/s (the recording has no accelerometer)"
     )
 
 
@@ -73,7 +72,7 @@ def test_moved_log_has_a_logged_verdict() -> None:
     moved = about("s", "r", decides=False, doubts=marked("r", "motion"))
     rows, steps = judge({"s": {"r": gyro(3.0)}}, {"robot": HEADING}, [moved])
     assert rows[0]["verdict"] == "not_enough_data"
-    assert words(rows[0]) == "as logged it meets the limits (margin 3)"
+    assert words(rows[0]) == "meets the limits (margin 3) as logged"
     assert rows[0]["corrected_verdict"] is None
     assert steps[0]["action"] == "record_again"
     # Where another recording decides, nothing hangs on the one that was left out.
@@ -102,4 +101,4 @@ def test_corrected_accelerometer_unit_changes_margin_and_text(factor: float, uni
     unit = [doubt("s", "r", "suspicious_unit", channel="accel_x", factor=factor)]
     rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], unit)
     assert rows[0]["corrected_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
-    assert words(rows[0]).endswith(f" if the accelerometer data are in {units}")
+    assert words(rows[0]).endswith(f" with the accelerometer data in {units}")

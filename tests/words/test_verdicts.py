@@ -105,11 +105,13 @@ def test_every_unknown_figure_has_words_and_a_unit(figure: Cause, quantity: str)
         ),
         (
             Condition("g_sensitivity", None, "gyro", 0.1001 * DEGREE / 9.80665, 3, 21),
-            "its gyro g-sensitivity is below 0.1 deg/s/g (1σ; 3 of 21 sensors print so little)",
+            "its gyro g-sensitivity is below 0.1 deg/s/g "
+            "(1σ; 3 of 21 datasheets print such a value)",
         ),
         (
             replace(SCALE, within=1, printing=1),
-            "its gyro scale factor error is below 1200 ppm (1σ; 1 of 1 sensor prints so little)",
+            "its gyro scale factor error is below 1200 ppm "
+            "(1σ; 1 of 1 datasheet prints such a value)",
         ),
         (MASS, "its mass meets the requirement"),
         (Condition(None, "axis", "gyro_x"), "it has a gyro x axis"),
@@ -131,7 +133,9 @@ def test_every_property_has_words(of: Property) -> None:
     without = Shortfall(of, subject, "5 g")
     assert is_plain(shortfall_text(without))
     if of not in ("quantity", "axis"):
-        assert shortfall_text(replace(without, has=(1.0,))).endswith(", required 5 g")
+        assert shortfall_text(replace(without, has=(1.0,))).endswith(
+            (", required 5 g", ", required: 5 g")
+        )
 
 
 @pytest.mark.parametrize(
@@ -150,11 +154,11 @@ def test_every_property_has_words(of: Property) -> None:
         ),
         (
             Shortfall("price_class", "consumer", "tactical or chip"),
-            "price class consumer, required tactical or chip",
+            "price class consumer, required: tactical or chip",
         ),
         (
             Shortfall("price_class", "", "tactical"),
-            "price class not stated, required tactical",
+            "price class not stated, required: tactical",
         ),
     ],
 )  # fmt: skip
@@ -184,7 +188,7 @@ def test_an_excluded_sensor_has_its_shortfalls() -> None:
     [
         ("measured", " (measured)"),
         ("datasheet", " (datasheet)"),
-        ("class limit", " (assumed worst of class)"),
+        ("class limit", " (assumed worst value)"),
         ("requirement", ""),
     ],
 )
@@ -202,7 +206,7 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("misalignment", "gyro", share=0.1, origin="class limit"),
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
-    assert origins_text(shares) == "assumed worst of class 60 %, noise 35 %, datasheet 5 %"
+    assert origins_text(shares) == "assumed worst value 60 %, noise 35 %, datasheet 5 %"
 
 
 @pytest.mark.parametrize(
@@ -245,10 +249,11 @@ def test_evidence_is_weak_for_reasons() -> None:
     assert weak() == ""
     assert evidence_text(row(evidence=None)) == ""
     assert weak("one_specimen", "short_log", "few_axes") == (
-        "one specimen; one log of 11 min; fewer than three axes"
+        "only one specimen; one log of 11 min; fewer than three axes"
     )
     assert weak("one_specimen", "periodic_drift", "not_explained", spread_of="other sensors") == (
-        "one specimen, spread taken from other sensors; the bias of the data oscillates slowly; "
+        "only one specimen, spread taken from other sensors; "
+        "the bias of the data oscillates slowly; "
         "no model explains the spectrum of the data"
     )
     assert weak("short_log", "wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
@@ -282,20 +287,20 @@ GYRO = UnitFactor("gyro", DEGREE)
     ("text", "expected"),
     [
         (corrected(None, None), ""),
-        (corrected("meets", None), "as logged it meets the limits (margin 0.1)"),
+        (corrected("meets", None), "meets the limits (margin 0.1) as logged"),
         (
             corrected(None, "meets", GYRO),
-            "it meets the limits (margin 7.5) if the gyro data are in °/s, not rad/s",
+            "meets the limits (margin 7.5) with the gyro data in °/s, not rad/s",
         ),
         (
             corrected("fails", "fails", UnitFactor("gyro", 1 / 17.5)),
-            "as logged it fails (margin 0.1); "
-            "it still fails (margin 7.5) if the gyro data are 17.5 times too large",
+            "fails (margin 0.1) as logged; "
+            "also fails (margin 7.5) with the gyro data divided by 17.5",
         ),
         (
             corrected("fails", "not_enough_data", GYRO, UnitFactor("accel", 2.0)),
-            "as logged it fails (margin 0.1); it cannot be judged if the gyro data are in °/s, "
-            "not rad/s, and the accelerometer data are 2 times too small",
+            "fails (margin 0.1) as logged; cannot be judged with the gyro data in °/s, "
+            "not rad/s, and the accelerometer data multiplied by 2",
         ),
     ],
 )
@@ -307,7 +312,7 @@ def test_every_alternative_is_a_sentence() -> None:
     judged = [verdict for verdict in get_args(Verdict) if verdict != "excluded"]
     for logged, verdict in product(judged, judged):
         text = corrected(logged, verdict, GYRO)
-        assert is_plain(text) and ("still" in text) == (logged == verdict)
+        assert is_plain(text) and ("also" in text) == (logged == verdict)
 
 
 # ------------------------------------------------------------------------------------ the answer
@@ -343,7 +348,7 @@ def test_the_most_common_reason_of_weak_evidence_is_named() -> None:
     one = row(evidence="weak", evidence_reasons=("one_specimen",), spread_of="this sensor")
     few = row("b", evidence="weak", evidence_reasons=("few_axes",))
     text = evidence_summary_text([one, few, one, row("c"), row("d", "excluded", evidence="weak")])
-    assert text == "Weak evidence for 3 of 4 verdicts: one specimen."
+    assert text == "The evidence for 3 of 4 verdicts is weak: only one specimen."
     assert evidence_summary_text([row(), row("b", evidence=None)]) == ""
 
 
@@ -376,7 +381,7 @@ def test_weak_evidence_stands_with_the_answer() -> None:
                longest_log=660.0)  # fmt: skip
     assert answer(weak) == (
         "A meets the limits. Only sensor with usable data (weak evidence: one log of 11 min; "
-        "one specimen)."
+        "only one specimen)."
     )
 
 
@@ -391,7 +396,7 @@ def test_unknown_figures_are_counted_in_the_answer() -> None:
 def test_sensors_that_cannot_be_judged_are_told_from_those_that_can() -> None:
     assert answer(row(), asked=2).endswith(" Only sensor with usable data.")
     assert answer(row(), row("c"), asked=3).endswith(" Best of 2 sensors with usable data.")
-    both = "the demanded properties and usable data"
+    both = "the required properties and usable data"
     assert answer(row(), asked=2, excluded=1).endswith(f" Only sensor with {both}.")
     assert answer(asked=2) == "No sensor has usable data."
     assert answer(asked=2, excluded=2) == f"No sensor has {both}."
@@ -413,9 +418,9 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
         row("g", "meets_if", conditions=(SCALE,)),
     ]
     assert others(rows) == (
-        "Also meet the limits: H. Likely meet the limits: E. Meet the limits on conditions: G. "
-        "Not enough data (no accelerometer): D. Likely fail: C. "
-        "Fail: B. Excluded: F (price class chip, required tactical)."
+        "Also meets the limits: H. Likely meets the limits: E. Meets the limits on conditions: G. "
+        "Not enough data: D (no accelerometer). Likely fails: C. "
+        "Fails: B. Excluded: F (price class chip, required: tactical)."
     )
 
 
@@ -425,7 +430,7 @@ def test_sensors_without_enough_data_stand_by_their_reasons() -> None:
         row("b", "not_enough_data"),
         row("c", "not_enough_data", reasons=("no gyro",)),
     ]
-    assert others(rows) == "Not enough data (no gyro): A, C. Not enough data: B."
+    assert others(rows) == "Not enough data: A (no gyro), B, C (no gyro)."
 
 
 def test_many_sensors_of_one_verdict_are_counted() -> None:

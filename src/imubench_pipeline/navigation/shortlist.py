@@ -33,6 +33,7 @@ from imubench_pipeline.navigation.suitability import (
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import budgets as texts
 from imubench_pipeline.words.verdicts import class_limit_text, worse_than_class_text
 
@@ -133,7 +134,7 @@ def _judge_by_datasheet(
     has = has.model_copy(update={"channels": channels, "logged_rate": None})
     lacking, unknown = judge(requirement, has)
     if not requirement.admits(sensor.price_class):
-        asked = " or ".join(requirement.price_class or ())
+        asked = join_names(requirement.price_class or (), "or")
         lacking.append(Shortfall("price_class", sensor.price_class or "", asked))
     if any(quantity in has.without for quantity in requirement.quantities):
         return replace(row, verdict="excluded", shortfalls=tuple(lacking))

@@ -97,15 +97,26 @@ def _make_cell(row: CoverageRow, found: Sequence[CatalogueRow]) -> Json:
     first = next(iter(ends.values()), [])
     return {
         "published": row.published,
-        "parts": [
-            (min(values), max(values), kind.replace("sigma", "σ")) for kind, values in ends.items()
-        ],
+        "parts": _list_ranges(ends),
         "value": max(map(abs, first), default=None),
-        "akin": "; ".join(row.as_printed) if not ends else "",
+        "akin": "" if ends else "; ".join(filter(None, dict.fromkeys(map(_describe_akin, found)))),
         "sources": list(
             dict.fromkeys(_describe_source(one) for one in found if one.state != "not looked up")
         ),
     }
+
+
+def _list_ranges(ends: Mapping[str, Sequence[float]]) -> list[tuple[float, float, str]]:
+    """Return each range of values with its kinds: those of the same range together."""
+    kinds: dict[tuple[float, float], list[str]] = {}
+    for kind, values in ends.items():
+        kinds.setdefault((min(values), max(values)), []).append(kind.replace("sigma", "σ"))
+    return [(low, high, join_names(names)) for (low, high), names in kinds.items()]
+
+
+def _describe_akin(row: CatalogueRow) -> str:
+    """Return a figure that cannot be converted, as printed, with its condition."""
+    return ", ".join(filter(None, (row.as_printed, row.condition))) if row.as_printed else ""
 
 
 def _convert_to_figure(row: CatalogueRow, value: float) -> float:
@@ -128,8 +139,8 @@ def format_counts(published: Iterable[str]) -> str:
     """Return how many sensors publish a figure, and for how many it was not looked up."""
     counts = Counter(published)
     unknown = counts["not looked up"]
-    text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown} looked up"
-    return f"{text}; {unknown} others not" if unknown else text
+    text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown}"
+    return f"{text}; {unknown} not looked up" if unknown else text
 
 
 def _make_share(rows: Sequence[CoverageRow]) -> Json:
@@ -149,13 +160,14 @@ def compare_with_paper(rows: Sequence[CoverageRow]) -> str:
             published.append(row.figure)
     complete = sum(len(published) == len(_PAPER_FIGURES) for published in found.values())
     counts = [
-        f"{figure} for {_make_share([row for row in rows if row.figure == figure])['of']}"
+        f"{_make_share([row for row in rows if row.figure == figure])['of']} print {figure}"
         for figure in _PAPER_FIGURES
     ]
     return (
-        "Maia et al. state that most manufacturers document stochastic errors incompletely; here "
-        f"{complete} of {len(found)} gyroscopes and accelerometers have all of "
-        f"{join_names(_PAPER_FIGURES)} published ({join_names(counts)} that were looked up)."
+        "Maia et al. state that most manufacturers document stochastic errors incompletely. "
+        f"{complete} of the {len(found)} gyroscopes and accelerometers below have all of "
+        f"{join_names(_PAPER_FIGURES)} published. Of those whose "
+        f"documents were searched, {join_names(counts)}."
     )
 
 

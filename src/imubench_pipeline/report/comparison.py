@@ -70,6 +70,7 @@ def make_parameter_cell(
     """Return a cell with a part for each component: its value, interval and status."""
     unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
+    rows = [row for row in rows if row.status != "absent"] or rows
     parts = [
         _part(
             row.value,

@@ -13,7 +13,7 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
 _STATISTIC_NAMES = dict.fromkeys(("adev_minimum", "plateau"), "bias instability")
 _STATISTIC_NAMES |= {"N": "N", "K": "K", "T_B": "T_B"}
-_STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
+_STATISTIC_TEXTS = {"adev_minimum": "if minimum of σ(τ)", "plateau": "if 0.664 B"}
 UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",
@@ -88,7 +88,7 @@ def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
     return DEPENDS, each
 
 
-DEPENDS = "depends on sidedness"
+DEPENDS = "depends on whether the density is one-sided"
 """The verdict where the readings of a density differ."""
 
 
@@ -113,7 +113,7 @@ def compare_sensors_with_datasheets(
         by_reading: dict[str, list[DatasheetRow]] = {}
         for row in (row for rows in group for row in rows):
             by_reading.setdefault(_name_reading(row), []).append(row)
-        readings = []
+        readings: list[dict[str, str]] = []
         for name, rows in by_reading.items():
             measured = sorted(row.measured for row in rows if row.measured is not None)
             ends = (measured[0], measured[-1]) if measured else (None, None)
@@ -126,9 +126,15 @@ def compare_sensors_with_datasheets(
                     "difference": _format_range([*map(_format_percent, (deltas[0], deltas[-1]))]),
                 }
             )
+        measured_texts = [f"{one['measured']} {unit.sign}" for one in readings]
+        if len(set(measured_texts)) > 1:
+            measured_texts = [
+                f"{text} {one['as']}" for text, one in zip(measured_texts, readings, strict=True)
+            ]
         yield {
             "sensor": sensor,
             "simulated": simulated,
+            "measured": list(dict.fromkeys(measured_texts)),
             "channel": channel,
             "quantity": _name_figure(first),
             "printed": format_printed(first),
@@ -178,7 +184,7 @@ def _name_figure(row: DatasheetRow) -> str:
 def _name_reading(row: DatasheetRow) -> str:
     """Return the name of an interpretation of a printed figure, if there are several."""
     if row.sidedness:
-        return f"read as {row.sidedness}"
+        return f"if {row.sidedness}"
     return _STATISTIC_TEXTS.get(row.statistic, "")
 
 

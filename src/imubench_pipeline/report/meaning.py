@@ -57,6 +57,11 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
+def _is_wide(interval: str) -> bool:
+    """Return whether the limits of an interval differ as printed."""
+    return isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
+
+
 _MAX_DIGITS = 3  # of errors, whose intervals do not include the limits of a class
 _MAX_REASONS = 2  # of an error in a cell; the tables of a run have all
 
@@ -132,6 +137,11 @@ class LimitLine:
     decides: bool
     reason: str
     backtest: str
+
+    @property
+    def parenthesis(self) -> str:
+        """The interval in parentheses; empty if it does not differ from the value as printed."""
+        return Markup(" ({})").format(self.interval) if _is_wide(self.interval) else ""
 
 
 @dataclass(frozen=True)

@@ -144,4 +144,5 @@ def format_printed(row: DatasheetRow | RepeatabilityRow) -> str:
     """Return the figure of a datasheet as printed; `NO_VALUE` if there is none."""
     if row.printed is None:
         return NO_VALUE
-    return f"{row.printed:g} {row.unit or ''}".rstrip()
+    sign = "±" if row.kind == "range" else ""
+    return f"{sign}{row.printed:g} {row.unit or ''}".rstrip()

@@ -83,16 +83,17 @@ def make_templates(system: System) -> jinja2.Environment:
         parts = []
         for part in cell["parts"]:
             value, status, lower, upper = (part[k] for k in ("value", "status", "lower", "upper"))
-            if value is None:
-                text = f"{_explain_term(status)}"
-            else:
-                mark = f' <span class="status">{status_text(status)}</span>' if status else ""
-                text = f"{number(value)}{mark}"
+            limits = ""
             if upper is not None:
                 is_bound = lower is None or (value is None and lower == 0.0)
-                limits = "below" if is_bound else f"{number(lower)} to"
-                text += f"<br><small>{limits} {number(upper)}</small>"
-            parts.append(text)
+                limits = f"{'below' if is_bound else f'{number(lower)} to'} {number(upper)}"
+            if value is not None:
+                mark = f' <span class="status">{status_text(status)}</span>' if status else ""
+                text = f"{number(value)}{mark}"
+                small = f"({limits})" if limits else ""
+            else:
+                text, small = limits, f"{_explain_term(status)}"
+            parts.append("<br>".join(filter(None, (text, small and f"<small>{small}</small>"))))
         none = " none" if cell["value"] is None else ""
         usual = _find_unit(unit, system).digits(None, None, None)
         of_digits = f' data-digits="{digits}"' if digits != usual else ""

@@ -204,7 +204,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
     elif row.verdict == "excluded":
         reason = "; ".join(map(verdicts.shortfall_text, row.shortfalls))
     elif row.left_out:
-        reason = verdicts.doubts_text(row.left_out[:1])
+        reason = verdicts.doubts_text(row.left_out)
     else:
         reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
@@ -232,7 +232,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         if row.verdict == "meets_if" and row.likely_margin is not None
         else None,
         verdicts.evidence_text(row) if judged else "",
-        verdicts.used_doubts_text(row),
+        verdicts.used_doubts_text(row) if judged else "",
         reason,
         alternatives,
         order,
@@ -305,6 +305,7 @@ def _start(site: Site) -> Mapping[str, object]:
             for view in warned
         ],
         "in_doubt": in_doubt,
+        "in_doubt_brief": f"{numbers.counted(len(warned), 'recording')} in doubt",
         "found": [name for name, _ in found.most_common(2)],
         "changed": site.changed_devices(),
         "rankings": list(_list_rankings(site)),
@@ -424,8 +425,8 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
     """Yield the deciding limit of the best sensor, its data, and the verdicts on the others."""
     for group in ranked[:1]:
         decides = next(limit for limit in group.limits if limit.decides)
-        text = Markup("Deciding limit, {}: {} expected ({}), {} allowed (1σ).").format(
-            decides.limit, decides.sigma, decides.interval, decides.allowed
+        text = Markup("Deciding limit: {}. Expected error {}{}, allowed {} (1σ).").format(
+            decides.limit, decides.sigma, decides.parenthesis, decides.allowed
         )
         if decides.reason:
             text += f" Not counted: {decides.reason}."
@@ -440,7 +441,7 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
     )
     for group in groups:
         if group.corrected:
-            yield f"{site.names[group.sensor]}: {group.corrected}."
+            yield f"{site.names[group.sensor]} {group.corrected}."
 
 
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:

@@ -1,6 +1,7 @@
 """Verdicts on sensors in words: requirements, conditions, evidence, doubts and next steps."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import ROUND_DOWN, Decimal
@@ -70,7 +71,7 @@ VERDICT_MEANINGS: Mapping[Verdict, str] = {
     "likely_fails": "2.5 to 50 %",
     "fails": "2.5 % or less",
     "cannot_meet": "fails with the best figures of its class",
-    "excluded": "lacks a demanded property",
+    "excluded": "lacks a required property",
 }
 
 
@@ -172,8 +173,8 @@ def condition_text(condition: verdicts.Condition) -> str:
     text = f"its {subject_text(condition)} is below {size}"
     if condition.printing is None:
         return f"{text} (1σ)"
-    printing = counted(condition.printing, "sensor prints", "sensors print")
-    return f"{text} (1σ; {condition.within} of {printing} so little)"
+    printing = counted(condition.printing, "datasheet prints", "datasheets print")
+    return f"{text} (1σ; {condition.within} of {printing} such a value)"
 
 
 def figure_text(quantity: str, cause: SourceCode, size: float) -> str:
@@ -218,7 +219,7 @@ def _name_property(of: verdicts.Property, subject: str) -> str:
 def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
-        return f"price class {shortfall.subject or 'not stated'}, required {shortfall.asked}"
+        return f"price class {shortfall.subject or 'not stated'}, required: {shortfall.asked}"
     name = _name_property(shortfall.property, shortfall.subject)
     _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":
@@ -244,13 +245,16 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
         name = "noise" if noise else _ORIGIN_WORDS[share.origin or "measured"]
         parts[name] = parts.get(name, 0.0) + share.share
     largest_first = sorted(parts.items(), key=lambda part: -part[1])
-    return ", ".join(f"{name} {100.0 * part:.0f} %" for name, part in largest_first)
+    shown = [(name, round(100.0 * part)) for name, part in largest_first if part >= 0.005]
+    if shown and (rest := 100 - sum(percent for _, percent in shown)) > 0:
+        shown.append(("other", rest))
+    return ", ".join(f"{name} {percent} %" for name, percent in shown)
 
 
 _ORIGIN_WORDS: Mapping[Origin, str] = {
     "measured": "measured",
     "datasheet": "datasheet",
-    "class limit": "assumed worst of class",
+    "class limit": "assumed worst value",
     "requirement": "stated",
 }
 """Origin of a figure in words."""
@@ -293,14 +297,15 @@ def evidence_summary_text(rows: Iterable[comparisons.RankingRow]) -> str:
     if not reasons:
         return ""
     reason, _ = Counter(reasons).most_common(1)[0]
-    return f"Weak evidence for {len(reasons)} of {counted(len(judged), 'verdict')}: {reason}."
+    of = counted(len(judged), "verdict")
+    return f"The evidence for {len(reasons)} of {of} is weak: {reason}."
 
 
 def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
     match code:
         case "one_specimen":
             borrowed = row.spread_of == "other sensors"
-            return "one specimen" + ", spread taken from other sensors" * borrowed
+            return "only one specimen" + ", spread taken from other sensors" * borrowed
         case "short_log":
             length = duration_text(row.longest_log)
             return f"one log of {length}" if row.recordings == 1 else f"no log longer than {length}"
@@ -349,7 +354,7 @@ _ANSWERS: Mapping[Verdict, str] = {
     "likely_fails": "Likely fails the limits of {}.",
     "fails": "Fails the limits of {}.",
     "cannot_meet": "Cannot meet the limits of {}.",
-    "excluded": "Lacks a demanded property for {}.",
+    "excluded": "Excluded from {}.",
 }
 
 
@@ -377,22 +382,22 @@ def corrected_text(row: comparisons.RankingRow) -> str:
     """Return the verdict with a corrected unit, or with the recordings that are not used."""
     parts = []
     if row.logged_verdict is not None:
-        parts.append(f"as logged it {_describe_outcome(row.logged_verdict, row.logged_margin)}")
+        parts.append(f"{_describe_outcome(row.logged_verdict, row.logged_margin)} as logged")
     if row.corrected_verdict is not None:
         outcome = _describe_outcome(row.corrected_verdict, row.corrected_margin)
-        still = "still " * (row.logged_verdict == row.corrected_verdict)
         why = f" ({'; '.join(row.corrected_reasons)})" * bool(row.corrected_reasons)
         named = []
         for each in row.corrected_units:
             name, factor = SENSORS[each.quantity], each.factor
             for size, units in _UNIT_MISTAKES[each.quantity]:
                 if math.isclose(factor, size, rel_tol=1e-6):
-                    named.append(f"the {name} data are in {units}")
+                    named.append(f"the {name} data in {units}")
                     break
             else:
-                times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
-                named.append(f"the {name} data are {number_text(times, 3)} times too {way}")
-        parts.append(f"it {still}{outcome} if {', and '.join(named)}{why}")
+                times, done = (1.0 / factor, "divided") if factor < 1.0 else (factor, "multiplied")
+                named.append(f"the {name} data {done} by {number_text(times, 3)}")
+        also = "also " * (row.logged_verdict == row.corrected_verdict)
+        parts.append(f"{also}{outcome} with {', and '.join(named)}{why}")
     return "; ".join(parts)
 
 
@@ -408,9 +413,9 @@ def answer_text(
     """Return the recommended sensors in one line, the best first; only judged ones.
 
     ``rows`` are the deciding rows of the judged sensors, the best first. ``asked`` is the number of
-    sensors, judged or not; ``excluded`` the number of those that lack a demanded property.
+    sensors, judged or not; ``excluded`` the number of those that lack a required property.
     """
-    having = "the demanded properties and usable data" if excluded else "usable data"
+    having = "the required properties and usable data" if excluded else "usable data"
     if not rows:
         return f"No sensor has {having}." if asked else "No recording answers it."
     best = rows[0]
@@ -489,14 +494,19 @@ def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]
         for row in listed:
             if row.verdict == verdict:
                 heading = _HEADINGS[verdict] + " on conditions" * bool(row.conditions)
-                if verdict == "not_enough_data" and row.reasons:
-                    heading += f" ({'; '.join(row.reasons)})"
-                why = f" ({'; '.join(map(shortfall_text, row.shortfalls))})" * bool(row.shortfalls)
-                by_heading.setdefault(heading, []).append(names[row.sensor] + why)
-    return [
-        f"{heading}: {', '.join(own) if len(own) <= _MAX_NAMES else counted(len(own), 'sensor')}."
-        for heading, own in by_heading.items()
-    ]
+                why = [*map(shortfall_text, row.shortfalls)]
+                why += row.reasons if verdict == "not_enough_data" else ()
+                text = f"{names[row.sensor]} ({'; '.join(why)})" if why else names[row.sensor]
+                by_heading.setdefault(heading, []).append(text)
+    lines = []
+    for heading, own in by_heading.items():
+        named = ", ".join(own) if len(own) <= _MAX_NAMES else counted(len(own), "sensor")
+        heading = _PLURAL.sub(r"\1s", heading) if len(own) == 1 else heading
+        lines.append(f"{heading}: {named}.")
+    return lines
+
+
+_PLURAL = re.compile(r"(?<!Cannot )\b([Mm]eet|[Ff]ail)\b")
 
 
 def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:

@@ -87,4 +87,4 @@ def list_commands(sensor: str, results: str) -> tuple[str, list[tuple[str, str]]
     for one in TARGETS.values():
         options = {"--sensor": sensor, "--target": one.name, "--output": one.file_name}
         lines.append((one.program, make_command("export", results, options)))
-    return "Files for filters and simulators", lines
+    return "Export to filters and simulators", lines

@@ -26,6 +26,7 @@ from imubench_pipeline.noise import TERMS
 from imubench_pipeline.noise.terms.base import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import parse_quantity
+from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import pools as texts
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -264,7 +265,7 @@ def judge_sensors(
             by_limit = list_standings(_select_deciding_rows(rows, basis), devices, usual[made])
             price_class, price = sensors[sensor]["price_class"], None
             if not requirement.admits(price_class):
-                asked = " or ".join(requirement.price_class or ())
+                asked = join_names(requirement.price_class or (), "or")
                 price = Shortfall("price_class", price_class or "", asked)
             yield Judgement(
                 name,

@@ -172,7 +172,8 @@ function ratioCell(ratio) {
   const cell = cellOf("", { className: "number ratio" });
   Object.assign(cell.dataset, { ratio: ratio.value ?? "", lower: ratio.lower ?? "", upper: ratio.upper ?? "" });
   const digits = countDigits(ratio.value, ratio.lower, ratio.upper);
-  cell.append(element("strong", { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }), element("br"), element("small", { textContent: ratioText(ratio) }));
+  if (ratio.value === null) cell.append(ratioText(ratio));
+  else cell.append(element("strong", { textContent: numberText(ratio.value, digits) }), element("br"), element("small", { textContent: `(${ratioText(ratio)})` }));
   return cell;
 }
 
@@ -182,7 +183,7 @@ function ownCell(one, unit) {
   const [value, limits] = estimateTexts(one.value, one.lower, one.upper, shown);
   const bound = one.status === "absent" && one.upper !== null ? `${limits} ${shown.sign}` : statusText(one.status);
   cell.append(one.value !== null ? `${value} ${shown.sign}` : bound);
-  if (one.value !== null && one.lower !== null && one.upper !== null) cell.append(element("br"), element("small", { textContent: limits }));
+  if (one.value !== null && one.lower !== null && one.upper !== null) cell.append(element("br"), element("small", { textContent: `(${limits})` }));
   return cell;
 }
 

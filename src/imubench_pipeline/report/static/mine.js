@@ -44,7 +44,7 @@ function drawPin(pin) {
 function putPins(main) {
   const put = (place, sensor, name) => {
     if (!sensor || (place.closest("table") ?? place.parentElement).querySelector(`.pin[data-sensor="${CSS.escape(sensor)}"]`)) return;
-    const pin = element("button", { type: "button", className: "pin", title: "My sensor: shows other numbers as multiples of its" });
+    const pin = element("button", { type: "button", className: "pin", title: "My sensor: other sensors' numbers are shown as multiples of this sensor's" });
     pin.dataset.sensor = sensor;
     pin.setAttribute("aria-label", `My sensor: ${name}`);
     drawPin(pin);

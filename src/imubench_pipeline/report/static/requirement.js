@@ -607,7 +607,7 @@ function showOwn(main, said, judged) {
     const { verdict, margin, margins, noise, conditions, rank } = judged[row.dataset.sensor] ?? { verdict: "not_enough_data", margin: null };
     const named = main.querySelector(`.legend > .${verdict.replaceAll("_", "-")}`);
     const size = margin !== null && verdict !== "excluded" && numberText(margin, Math.min(countDigits(margin, ...margins), 3));
-    const words = `<span class="said">${named.querySelector("svg").outerHTML}<b>${named.querySelector("b").textContent}</b>${conditions ? ` <small>${conditions} not known</small>` : ""}</span>`;
+    const words = `<span class="said">${named.querySelector("svg").outerHTML}<b>${named.querySelector("b").textContent}</b>${conditions ? ` <small>${conditions} ${conditions === 1 ? "figure" : "figures"} not known</small>` : ""}</span>`;
     const reference = judged[mine]?.margin;
     const multiple = !(reference > 0) ? "" : row.dataset.sensor === mine ? "mine" : `${numberText(margin / reference, 2)} × mine`;
     put(row, "td", `${words}${size ? ` <span class="size"><span class="value">${size}</span>${multiple && `<span class="mine">${multiple}</span>`}</span> <small class="ranked">noise alone ${numberText(noise, 2)}${rank ? `, rank ${rank}` : ""}</small>` : ""}`, `cell ${verdict.replaceAll("_", "-")}${conditions ? " conditional" : ""}`);

@@ -319,7 +319,7 @@ function drawErrors(root) {
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   const without = chosen.filter((one) => !grownOf(one)).map(shortName);
-  table.caption.textContent = `1σ of noise alone, ${axesText()}, after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
+  table.caption.textContent = `Errors from noise alone (1σ, ${axesText()}): biases and tilt estimated over ${timeText(growthOf.window)} at rest, then ${timeText(growthOf.time)} of dead reckoning${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
 }
 
 kinds.growth = () => {
