@@ -55,7 +55,7 @@ def beats(one: Array, other: Array) -> float:
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Score a model against a curve and its relative error, all (m,), SI, by draws (k, m)."""
+    """Score a model against a curve and its relative error, shape (m,), SI, by draws (k, m)."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)
