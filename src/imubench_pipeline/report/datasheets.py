@@ -126,15 +126,13 @@ def compare_sensors_with_datasheets(
                     "difference": _format_range([*map(_format_percent, (deltas[0], deltas[-1]))]),
                 }
             )
-        measured_texts = [f"{one['measured']} {unit.sign}" for one in readings]
-        if len(set(measured_texts)) > 1:
-            measured_texts = [
-                f"{text} {one['as']}" for text, one in zip(measured_texts, readings, strict=True)
-            ]
+        differ = len({one["measured"] for one in readings}) > 1
         yield {
             "sensor": sensor,
             "simulated": simulated,
-            "measured": list(dict.fromkeys(measured_texts)),
+            "measured": list(
+                dict.fromkeys((one["measured"], one["as"] if differ else "") for one in readings)
+            ),
             "channel": channel,
             "quantity": _name_figure(first),
             "printed": format_printed(first),
