@@ -38,7 +38,7 @@ from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
-from imubench_pipeline.simulate.profiles import DayCycle, Profile, Steps, Sum, WarmUp
+from imubench_pipeline.simulate.profiles import Profile, make_day_cycle, make_steps, make_warm_up
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables.keys import Key
 from temperature import behind, bounds
@@ -109,7 +109,7 @@ class Case:
 
     def truth(self) -> Array:
         """Return the true temperature at every sample, °C."""
-        return self.temperature.at(np.arange(self.samples) / self.rate)
+        return self.temperature(np.arange(self.samples) / self.rate)
 
 
 def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:
@@ -120,17 +120,18 @@ def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:
 def temperature(profile: str, duration: float, rng: np.random.Generator) -> Profile:
     """Return a random temperature of a kind; ``duration`` in s."""
     start = rng.uniform(15.0, 30.0)
-    warm_up = WarmUp(start, start + rng.uniform(5.0, 15.0), rng.uniform(300.0, 1800.0), 0.0)
+    warm_up = make_warm_up(start, start + rng.uniform(5.0, 15.0), rng.uniform(300.0, 1800.0), 0.0)
     period = duration / rng.uniform(0.7, 3.0)
-    day = DayCycle(22.0, rng.uniform(3.0, 8.0), period, rng.uniform(0.0, period))
+    day = make_day_cycle(0.0, rng.uniform(3.0, 8.0), period, rng.uniform(0.0, period))
     if profile == "warm-up":
         return warm_up
     if profile == "day cycle":
-        return day
+        return lambda times: 22.0 + day(times)
     if profile == "steps":
-        begins = np.arange(8) * duration / 8.0
-        return Steps(tuple(begins), tuple(rng.uniform(10.0, 40.0, 8)))
-    return Sum((warm_up, replace(day, mean=0.0)))
+        return make_steps(
+            [k * duration / 8.0 for k in range(8)], rng.uniform(10.0, 40.0, 8).tolist()
+        )
+    return lambda times: warm_up(times) + day(times)
 
 
 def case(number: int) -> Case:
@@ -329,7 +330,7 @@ def bound_of(made: Case) -> tuple[float, float]:
     spectrum = np.exp(np.interp(np.log(omega), np.log(places), np.log(density)))
     truth, lag, s = made.truth(), model.drift.lag, model.drift.sensitivity
     bound = bounds(spectrum, truth, made.rate, lag, 0.0)[0]
-    if not isinstance(made.temperature, Steps) or s == 0.0:
+    if made.profile != "steps" or s == 0.0:
         return bound, bound
     columns = [behind(truth, made.rate, lag)]
     if lag > 0.0:

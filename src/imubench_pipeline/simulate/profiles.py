@@ -7,7 +7,7 @@ temperature in °C.
 
 import math
 import re
-from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -139,101 +139,47 @@ class FileSeries:
         return ConfigError(f"{self.path}: cannot be read: {error}{expected}")
 
 
-class Profile(ABC):
-    """A quantity over time, in SI (temperature: °C)."""
-
-    @abstractmethod
-    def at(self, times: Array) -> Array:
-        """Return the values at ascending times in s, in their shape."""
+Profile = Callable[[Array], Array]
+"""A quantity over time: returns its values at ascending times in s, in SI (temperature: °C)."""
 
 
-@dataclass(frozen=True)
-class Constant(Profile):
-    """One value."""
-
-    value: float
-
-    def at(self, times: Array) -> Array:
-        """Return the value at every time."""
-        return np.full(len(times), self.value)
+def make_constant(value: float) -> Profile:
+    """Return a profile of one value."""
+    return lambda times: np.full(len(times), value)
 
 
-@dataclass(frozen=True)
-class SampledProfile(Profile):
-    """A value at each sample of a log."""
-
-    values: Array
-    rate: float
-
-    def at(self, times: Array) -> Array:
-        """Return the values of the samples at these times."""
-        return self.values[np.rint(times * self.rate).astype(np.int64)]
+def make_sampled(values: Array, rate: float) -> Profile:
+    """Return a profile with a value at each sample of a log at a rate, Hz."""
+    return lambda times: values[np.rint(times * rate).astype(np.int64)]
 
 
-@dataclass(frozen=True)
-class Steps(Profile):
-    """Piecewise constant values from their times on; the first one also before."""
-
-    times: tuple[float, ...]
-    values: tuple[float, ...]
-
-    def at(self, times: Array) -> Array:
-        """Return the value of the last step at or before each time."""
-        place = np.searchsorted(np.array(self.times), times, side="right") - 1
-        return np.asarray(np.array(self.values)[np.maximum(place, 0)])
+def make_steps(starts: Sequence[float], values: Sequence[float]) -> Profile:
+    """Return piecewise constant values from their times on; the first one also before."""
+    at, levels = np.array(starts), np.array(values)
+    return lambda times: levels[np.maximum(np.searchsorted(at, times, side="right") - 1, 0)]
 
 
-@dataclass(frozen=True)
-class DayCycle(Profile):
-    """mean + amplitude cos(2 pi (t - highest) / period)."""
-
-    mean: float
-    amplitude: float
-    period: float
-    highest: float
-
-    def at(self, times: Array) -> Array:
-        """Return the cosine at each time."""
-        turns = (times - self.highest) / self.period
-        return np.asarray(self.mean + self.amplitude * np.cos(2.0 * math.pi * turns))
+def make_day_cycle(mean: float, amplitude: float, period: float, highest: float) -> Profile:
+    """Return mean + amplitude cos(2 pi (t - highest) / period)."""
+    return lambda times: mean + amplitude * np.cos(2.0 * math.pi * ((times - highest) / period))
 
 
-@dataclass(frozen=True)
-class WarmUp(Profile):
-    """From start to end as 1 - e^(-(t - begin) / time_constant); start before ``begin``."""
-
-    start: float
-    end: float
-    time_constant: float
-    begin: float
-
-    def at(self, times: Array) -> Array:
-        """Return the exponential at each time."""
-        since = np.maximum(times - self.begin, 0.0)
-        risen = -np.expm1(-since / self.time_constant)
-        return np.asarray(self.start + (self.end - self.start) * risen)
-
-
-@dataclass(frozen=True)
-class Sum(Profile):
-    """Several profiles together."""
-
-    parts: tuple[Profile, ...]
-
-    def at(self, times: Array) -> Array:
-        """Return the sum at each time."""
-        return np.asarray(sum(part.at(times) for part in self.parts))
+def make_warm_up(start: float, end: float, time_constant: float, begin: float) -> Profile:
+    """Return start to end as 1 - e^(-(t - begin) / time_constant); start before ``begin``."""
+    return lambda times: (
+        start + (end - start) * -np.expm1(-np.maximum(times - begin, 0.0) / time_constant)
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class FileColumn(Profile):
-    """A column of a file, linear between its rows and constant beyond them."""
+class FileColumn:
+    """Profile of a column of a file, linear between its rows and constant beyond them."""
 
     path: Path
     times: Array
     values: Array
 
-    def at(self, times: Array) -> Array:
+    def __call__(self, times: Array) -> Array:
         """Interpolate the column."""
         return np.interp(times, self.times, self.values)
 
@@ -279,15 +225,16 @@ def _make_formula_profile(
     )
     match form:
         case profile_forms.ConstantForm():
-            return Constant(value(form.value))
+            return make_constant(value(form.value))
         case profile_forms.StepsForm():
-            return Steps(tuple(map(time, form.times)), tuple(map(value, form.values)))
+            return make_steps([*map(time, form.times)], [*map(value, form.values)])
         case profile_forms.DayCycleForm():
             swing = units.parse_difference(form.amplitude, dimension)
-            return DayCycle(value(form.mean), swing, time(form.period), time(form.highest))
+            return make_day_cycle(value(form.mean), swing, time(form.period), time(form.highest))
         case profile_forms.WarmUpForm():
             start, end = value(form.start), value(form.end)
-            return WarmUp(start, end, time(form.time_constant), time(form.begin))
+            return make_warm_up(start, end, time(form.time_constant), time(form.begin))
     first, *others = form.parts
-    added = (_make_formula_profile(part, dimension, difference=True) for part in others)
-    return Sum((_make_formula_profile(first, dimension), *added))
+    parts = [_make_formula_profile(part, dimension, difference=True) for part in others]
+    parts.insert(0, _make_formula_profile(first, dimension))
+    return lambda times: sum((part(times) for part in parts), np.zeros(len(times)))
