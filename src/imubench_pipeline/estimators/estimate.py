@@ -142,16 +142,9 @@ class JointDraws:
     def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
         """Return the noise model of a draw, numbered from 0, with lines beside the noise."""
         Q, N, B, T_B, K, R = self.first[number].tolist()
-        return NoiseModel(
-            Q=Q,
-            N=N,
-            B=B,
-            T_B=T_B if T_B > 0.0 else None,
-            K=K,
-            R=R,
-            further=[GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0],
-            sinusoids=sinusoids,
-        )
+        time = T_B if T_B > 0.0 else None
+        further = [GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0]
+        return NoiseModel(Q=Q, N=N, B=B, T_B=time, K=K, R=R, further=further, sinusoids=sinusoids)
 
 
 @dataclass(frozen=True)
@@ -198,15 +191,12 @@ class Estimate:
     def model(self) -> NoiseModel:
         """The noise model of the parameters that have a value, or are fitted."""
         values = {name: parameter.in_model for name, parameter in self.parameters.items()}
+        amplitudes = {name: values.get(name) or 0.0 for name in ("Q", "N", "B", "K", "R")}
         pairs = [(group["B"].in_model, group["T_B"].in_model) for group in self.further]
         waves = [(group["amplitude"].in_model, group["frequency"].in_model) for group in self.lines]
         return NoiseModel(
-            Q=values.get("Q") or 0.0,
-            N=values.get("N") or 0.0,
-            B=values.get("B") or 0.0,
+            **amplitudes,
             T_B=values.get("T_B"),
-            K=values.get("K") or 0.0,
-            R=values.get("R") or 0.0,
             further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
             sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )

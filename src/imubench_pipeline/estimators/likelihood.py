@@ -15,7 +15,6 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
 from imubench_pipeline.estimators import least_squares, missing, white_level
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
-from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
@@ -72,11 +71,6 @@ class Likelihood:
     fitted: Array
     """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
-
-    @property
-    def low_pass(self) -> Cutoff | None:
-        """The sensor's own low-pass filter; None if it was not searched for."""
-        return self.frame.low_pass
 
 
 def fit(
@@ -204,7 +198,8 @@ def fit_spectrum(
     of_papers = _InTheLog(whittle, frame, posteriors, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
     noise = frame.whittle(spectrum, all_bins=True).density(chosen.maximum)
-    fitted = noise * frame.gain + chosen.maximum.ramp**2 * spectrum.ramp
+    gain = 1.0 if frame.gain is None else frame.gain
+    fitted = noise * gain + chosen.maximum.ramp**2 * spectrum.ramp
     sinusoids = select_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
     parameters = {name: gauss_markov.parameters[name] for name in PARAMETERS}

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
 from types import MappingProxyType
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.model.states import Measured
+from imubench_pipeline.model.states import MEASURED, Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, uncertainty
 from imubench_pipeline.navigation.error_budget.budget import (
@@ -88,12 +87,12 @@ class Question:
     @property
     def needs(self) -> tuple[Measured, ...]:
         """Quantities that are needed to compute it."""
-        return ("gyro",) if self.error in ("heading", "cross_track", "north") else _QUANTITIES
+        return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
     @property
     def uses(self) -> tuple[Measured, ...]:
         """Quantities that are used if they are recorded: accelerometers level a gyro for north."""
-        return _QUANTITIES if self.error == "north" else self.needs
+        return MEASURED if self.error == "north" else self.needs
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
@@ -154,7 +153,6 @@ class Question:
         )
 
 
-_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
 _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 
 
@@ -229,7 +227,7 @@ def list_error_rows(
     axes = collect_axis_errors(estimates, figures)
     without = {
         quantity: AxisErrors(figures=figures.get(quantity, in_use.NO_FIGURES))
-        for quantity in _QUANTITIES
+        for quantity in MEASURED
     }
 
     drawn = {

@@ -13,7 +13,7 @@ from imubench_pipeline.datasheets.class_limits import find_limit
 from imubench_pipeline.datasheets.printed_noise import WALK_TIMES, PrintedNoise, read_printed_noise
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.model.states import Measured, Verdict
+from imubench_pipeline.model.states import MEASURED, Measured, Verdict
 from imubench_pipeline.model.verdicts import Share, Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import read_figures
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -37,7 +37,6 @@ from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import budgets as texts
 from imubench_pipeline.words.verdicts import class_limit_text, worse_than_class_text
 
-_QUANTITIES: tuple[Measured, ...] = ("gyro", "accel")
 _MIN_SHARE = 0.01  # of the variance
 _MIN_EXCESS = 1.001  # of a printed figure over the worst of the class, which is rounded
 
@@ -52,9 +51,9 @@ class _PrintedErrors:
 
 
 def _read_printed_errors(sensor: Sensor) -> _PrintedErrors:
-    noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if getattr(sensor.datasheet, q)}
+    noise = {q: read_printed_noise(sensor, q) for q in MEASURED if getattr(sensor.datasheet, q)}
     axes, remarks = {}, []
-    for q in _QUANTITIES:
+    for q in MEASURED:
         models = noise[q].models if q in noise else dict.fromkeys(WALK_TIMES, NoiseModel())
         figures = read_figures(sensor, q)
         axes[q] = AxisErrors(models["in_use"], figures, models["likely"], models["best"])
@@ -130,7 +129,7 @@ def _judge_by_datasheet(
     )
     # The sensor has all axes of its quantities, logged or not.
     has = read_abilities(sensor)
-    channels = tuple(f"{q}_{axis}" for q in _QUANTITIES if q not in has.without for axis in "xyz")
+    channels = tuple(f"{q}_{axis}" for q in MEASURED if q not in has.without for axis in "xyz")
     has = has.model_copy(update={"channels": channels, "logged_rate": None})
     lacking, unknown = judge(requirement, has)
     if not requirement.admits(sensor.price_class):

@@ -16,13 +16,12 @@ All budgets here assume:
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from scipy.optimize import brentq
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.states import Measured
+from imubench_pipeline.model.states import MEASURED, Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, parts
 from imubench_pipeline.noise import NoiseModel
@@ -39,7 +38,6 @@ ACCEL_ORDER: dict[parts.Quantity, int] = {"velocity": 0, "position": 1}
 """Number of integrations minus one, m of `growth`."""
 
 
-_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
 _MIN_TIME = 1e-6
 _MAX_TIME = 1e9
 _CROSSING_POINTS = 4096
@@ -147,7 +145,7 @@ def _list_levers(
         )
         yield from (("accel", lever) for lever in levers)
     levelled = start.tilt is None
-    for measured in _QUANTITIES:
+    for measured in MEASURED:
         for lever in in_use.list_turn_levers(measured, quantity, time, use, levelled=levelled):
             yield measured, lever
     if quantity == "attitude" and levelled:
