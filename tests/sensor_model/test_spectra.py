@@ -14,6 +14,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
 )
 from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate.discretisation import (
     compute_white_factor,
     discretise_slow_sources,
@@ -23,7 +24,6 @@ from imubench_pipeline.simulate.model import (
     SensorModel,
     compute_sampled_spectrum,
     fit_density_bank,
-    sources_of,
 )
 from tests.sensor_model import theory
 
@@ -131,7 +131,7 @@ def test_flicker_bank_has_the_sampled_spectrum_of_flicker_noise(order: int) -> N
     model = SensorModel(noise=NoiseModel(B=0.7), low_pass=LowPass(64.0, order))
     bank = fit_density_bank(0.7, 0.5 / 3600.0, MAX_FREQUENCY_RATIO * 64.0)
     omega = np.geomspace(2 * np.pi / 3600.0, np.pi * RATE, 50) / RATE
-    found = compute_sampled_spectrum(sources_of(bank), model.low_pass, omega, RATE)
+    found = compute_sampled_spectrum(drives_of(bank), model.low_pass, omega, RATE)
     np.testing.assert_allclose(found, model.sampled_spectrum(omega, RATE), rtol=2e-3)
 
 
@@ -164,7 +164,7 @@ def test_quantization_is_behind_the_filter() -> None:
 
 def test_sources_are_what_has_a_density() -> None:
     terms = [WhiteNoise(2.0), WhiteNoise(1.0), RandomWalk(3.0), Flicker(2.0)]
-    found = sources_of(terms)
+    found = drives_of(terms)
     assert (found.white, found.flicker) == (5.0, 4.0)
     assert found.times.tolist() == [np.inf] and found.densities.tolist() == [9.0]
 

@@ -14,7 +14,6 @@ an estimate of N from a rounded log already contains the rounding (`in_the_log`)
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -23,9 +22,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 from scipy.optimize import nnls
 
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, Term, compute_bias_instability
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, compute_bias_instability
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.noise.terms.base import drives_of
+from imubench_pipeline.noise.terms.base import Drives, drives_of
 from imubench_pipeline.simulate import discretisation
 from imubench_pipeline.typing import Array
 
@@ -37,43 +36,31 @@ interval, whichever is shorter."""
 _MAX_TIME_RATIO = 1e5  # longest correlation time of flicker noise, over the longest requested time
 
 
-@dataclass(frozen=True)
-class Sources:
-    """Noise at the input of a filter; the spectrum after it has a closed form.
+def _realise(
+    drives: Drives, low_pass: LowPass, interval: float, longest: float
+) -> tuple[Array, Array]:
+    """Return times and densities, (n,), with flicker noise as processes; arguments in s."""
+    if drives.flicker == 0.0:
+        return drives.times, drives.densities
+    # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
+    shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
+    longest *= _MAX_TIME_RATIO
+    count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
+    times = np.geomspace(shortest, longest, count)
+    variance = math.log(times[1] / times[0]) / math.pi
+    densities = drives.flicker * 2.0 * variance / times
+    return np.concatenate([drives.times, times]), np.concatenate([drives.densities, densities])
 
-    It follows from the exact discrete state space of the process and its filter. Flicker noise is a
-    sum of Gauss-Markov processes, truncated at correlation times of negligible contribution.
+
+def compute_sampled_spectrum(drives: Drives, low_pass: LowPass, omega: Array, rate: float) -> Array:
+    """Return the spectrum of samples at a rate, Hz, SI^2, in the shape of omega, rad/sample.
+
+    It follows from the exact discrete state space of each process and the filter.
     """
-
-    white: float  # N^2
-    flicker: float  # B^2 of flicker noise
-    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
-    # processes; an infinite time: a random walk
-    times: Array
-    densities: Array
-
-    def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities, (n,), with flicker noise as processes; arguments in s."""
-        if self.flicker == 0.0:
-            return self.times, self.densities
-        # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
-        shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
-        longest *= _MAX_TIME_RATIO
-        count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
-        times = np.geomspace(shortest, longest, count)
-        variance = math.log(times[1] / times[0]) / math.pi
-        densities = self.flicker * 2.0 * variance / times
-        return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
-
-
-def compute_sampled_spectrum(
-    sources: Sources, low_pass: LowPass, omega: Array, rate: float
-) -> Array:
-    """Return the spectrum of samples at a rate, Hz, SI^2, in the shape of omega, rad/sample."""
     interval = 1.0 / rate
     flat = np.ravel(omega)
     lowest = float(np.abs(flat).min(initial=math.pi))
-    times, densities = sources.realised(low_pass, interval, interval / lowest)
+    times, densities = _realise(drives, low_pass, interval, interval / lowest)
     slow = discretisation.discretise_slow_sources(times, interval, low_pass)
     transition = np.asarray(expm(low_pass.transition * interval))
     white = discretisation.compute_white_factor(low_pass, interval)
@@ -86,7 +73,7 @@ def compute_sampled_spectrum(
             (turn - transition).swapaxes(1, 2),
             np.broadcast_to(low_pass.output[:, None], (len(w), low_pass.order, 1)).astype(complex),
         )[..., 0]
-        power = sources.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
+        power = drives.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
         if len(times):
             # z - e^(-interval/T), without cancellation where both are close to 1
             gap = (-2.0 * np.sin(w / 2.0) ** 2 + 1j * np.sin(w))[:, None] + slow.lost
@@ -166,16 +153,8 @@ class SensorModel:
         behind = [
             term.sampled_spectrum(w, 1.0 / rate) for term in self.noise.terms if term.drive is None
         ]
-        before = compute_sampled_spectrum(sources_of(self.noise.terms), self.low_pass, w, rate)
+        before = compute_sampled_spectrum(drives_of(self.noise.terms), self.low_pass, w, rate)
         return np.asarray(np.sum(behind, axis=0) + rounding + before)
-
-
-def sources_of(terms: Sequence[Term]) -> Sources:
-    """Return the noise terms at the input of a filter; those without a density are left out."""
-    drives = drives_of(terms)
-    slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
-    times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
-    return Sources(drives.white, drives.flicker, times, densities)
 
 
 def in_the_log(model: SensorModel, rate: float) -> float:

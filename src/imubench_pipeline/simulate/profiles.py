@@ -149,7 +149,7 @@ def make_constant(value: float) -> Profile:
 
 
 def make_sampled(values: Array, rate: float) -> Profile:
-    """Return a profile with a value at each sample of a log at a rate, Hz."""
+    """Return a profile of the samples, shape (n,), of a log at a rate, Hz."""
     return lambda times: values[np.rint(times * rate).astype(np.int64)]
 
 

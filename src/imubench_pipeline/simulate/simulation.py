@@ -19,6 +19,7 @@ from numba import njit
 from scipy.linalg import expm
 
 from imubench_pipeline.noise import Term
+from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate.discretisation import (
     compute_stationary_distribution,
     compute_white_factor,
@@ -29,7 +30,6 @@ from imubench_pipeline.simulate.model import (
     MAX_FREQUENCY_RATIO,
     SensorModel,
     fit_density_bank,
-    sources_of,
 )
 from imubench_pipeline.typing import Array
 
@@ -194,9 +194,8 @@ class _Axis:
                 # Down to the frequency 1 / (2 duration)
                 highest = MAX_FREQUENCY_RATIO * max(model.low_pass.cutoff, rate / 2.0)
                 banks += fit_density_bank(term.drive.flicker, 0.5 / duration, highest)
-        sources = sources_of([*terms, *banks])
-        self._times, self._densities = sources.times, sources.densities
-        self._white = sources.white
+        drives = drives_of([*terms, *banks])
+        self._times, self._densities, self._white = drives.times, drives.densities, drives.white
         begin, self._noise, lines, self._counts = rng.spawn(4)
         self._slow, self._filter = self._discretise(interval)
         drift = model.drift

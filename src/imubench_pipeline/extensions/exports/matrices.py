@@ -194,8 +194,9 @@ def write_python(imu: Imu) -> str:
         longest = max(FLICKER_TAU_OVER_HORIZON * imu.horizon, 4.0 / imu.rate)
         drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
         white = float(drives.white)
-        walk = float(sum(walk.density for walk in drives.walks))
-        processes = [(float(part.density), float(part.T_B)) for part in drives.processes]
+        slow = list(zip(drives.densities.tolist(), drives.times.tolist(), strict=True))
+        walk = float(sum(S for S, T in slow if T == np.inf))
+        processes = [part for part in slow if part[1] < np.inf]
         unit = {"gyro": ("rad/s", "rad"), "accel": ("m/s^2", "m/s")}[name]
         entries += f'    "{name}": {{\n'
         entries += f'        "white": {white!r},  # N^2, ({unit[0]})^2/Hz\n'

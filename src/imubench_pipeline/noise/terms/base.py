@@ -292,20 +292,20 @@ class Drives:
 
     white: float  # density N^2, SI^2/Hz
     flicker: float  # B^2 of flicker noise, SI^2
-    processes: tuple[Process, ...]  # Gauss-Markov processes
-    walks: tuple[Process, ...]  # random walks, whose correlation time is infinite
+    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
+    # processes, and then of random walks, whose time is infinite
+    times: Array
+    densities: Array
 
 
 def drives_of(terms: Iterable[Term]) -> Drives:
     """Return the joint input of terms to a filter; terms without a density are left out."""
     drives = [term.drive for term in terms if term.drive is not None]
-    processes = [drive.process for drive in drives if drive.process is not None]
-    return Drives(
-        sum(drive.white for drive in drives),
-        sum(drive.flicker**2 for drive in drives),
-        tuple(process for process in processes if math.isfinite(process.T_B)),
-        tuple(process for process in processes if math.isinf(process.T_B)),
-    )
+    slow = [(each.process.T_B, each.process.density) for each in drives if each.process is not None]
+    slow.sort(key=lambda part: math.isinf(part[0]))
+    times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
+    white, flicker = sum(each.white for each in drives), sum(each.flicker**2 for each in drives)
+    return Drives(white, flicker, times, densities)
 
 
 _REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
