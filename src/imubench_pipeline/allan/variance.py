@@ -102,10 +102,6 @@ class AllanCurve:
         sources = [s for s, chosen in zip(self.edf_source, points, strict=True) if chosen]
         return replace(self, **columns, edf_source=sources)
 
-    def up_to(self, part: float) -> Array:
-        """Return the tau up to a part of the log, s."""
-        return self.tau[self.cluster_size <= part * self.samples]
-
     def limits(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
         return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)

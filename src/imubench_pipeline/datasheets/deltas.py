@@ -165,11 +165,11 @@ class Delta:
     measured: float | None
     lower: float | None
     upper: float | None
-    delta: float | None
-    delta_lower: float | None
-    delta_upper: float | None
     verdict: str
     reasons: tuple[str, ...]
+    delta: float | None = None
+    delta_lower: float | None = None
+    delta_upper: float | None = None
 
 
 def deltas(
@@ -237,9 +237,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         measured=value,
         lower=lower,
         upper=upper,
-        delta=None,
-        delta_lower=None,
-        delta_upper=None,
         verdict="not published" if entry.looked_up else "not looked up",
         reasons=(entry.reason,) if entry.reason else (),
     )

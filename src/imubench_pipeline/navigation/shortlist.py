@@ -137,7 +137,6 @@ def _judge_by_datasheet(
         lacking.append(Shortfall("price_class", sensor.price_class or "", asked))
     if any(quantity in has.without for quantity in requirement.quantities):
         return replace(row, verdict="excluded", shortfalls=tuple(lacking))
-    noise = printed.noise
     answers = [
         (question, *question.answer_all(printed.axes["gyro"], printed.axes["accel"]))
         for question in questions
@@ -165,6 +164,7 @@ def _judge_by_datasheet(
         for source, size in figures.items()
     )
     helps = all(figures and min(figures.values()) > 0.0 for figures in by_limit)
+    shares = list(_list_shares(budget, printed.noise))
     conditions = tuple(unknown)
     worst_best = min(each[3] for each in margins)
     verdict: Verdict = "meets"
@@ -187,8 +187,14 @@ def _judge_by_datasheet(
         decides=requirement.by_dead_reckoning[place].text,
         verdict=verdict,
         conditions=conditions if verdict != "excluded" else (),
-        parts=tuple(_list_shares(budget, noise)),
-        assumed=tuple(dict.fromkeys(_list_assumed(budget, noise))),
+        parts=tuple(share for share, _ in shares),
+        assumed=tuple(
+            dict.fromkeys(
+                class_limit_text(share.quantity, share.source, sigma)
+                for share, sigma in shares
+                if share.origin == "class limit" and share.quantity
+            )
+        ),
         shortfalls=tuple(lacking),
         reasons=(
             *((texts.NOISE_NOT_PRINTED,) if verdict == "not_enough_data" else ()),
@@ -197,8 +203,10 @@ def _judge_by_datasheet(
     )
 
 
-def _list_shares(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iterator[Share]:
-    """Yield the sources with a relevant share of the variance, the largest first."""
+def _list_shares(
+    budget: Budget, noise: Mapping[Measured, PrintedNoise]
+) -> Iterator[tuple[Share, float | None]]:
+    """Yield the sources with a relevant share, the largest first, with the figures of others."""
     for part in sorted(budget.contributions, key=lambda part: -part.sigma):
         share = (part.sigma / budget.total) ** 2 if budget.total else 0.0
         if share >= _MIN_SHARE:
@@ -208,15 +216,5 @@ def _list_shares(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iter
             else:
                 assumed = source.quantity and source.source in noise[source.quantity].assumed
                 origin = "class limit" if assumed else "datasheet"
-            yield Share(**asdict(source), share=share, origin=origin)
-
-
-def _list_assumed(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iterator[str]:
-    """Yield the sources that count with a limit of their class, in words."""
-    figures = {
-        (part.source.quantity, part.source.source): part.figure for part in budget.contributions
-    }
-    for share in _list_shares(budget, noise):
-        if share.origin == "class limit" and share.quantity:
-            figure = figures[share.quantity, share.source]
-            yield class_limit_text(share.quantity, share.source, figure.sigma if figure else None)
+            sigma = part.figure.sigma if part.figure else None
+            yield Share(**asdict(source), share=share, origin=origin), sigma

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
+import numpy as np
 from pydantic import Field
 
 from imubench_pipeline.datasheets.class_limits import count_sensors_within
@@ -83,12 +84,10 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     ]
     by_axis = []
     for axis in "xyz":
-        printed = [(figure, figure.on_axis(axis)) for figure in figures]
         values = [
             convert_to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
-            for figure, value in printed
-            if value is not None
-            for size in (value if isinstance(value, tuple) else (value,))
+            for figure in figures
+            for size in np.ravel(figure.on_axis(axis) or ()).tolist()
         ]
         if not values:
             return None

@@ -6,7 +6,7 @@ log less the bias is integrated m + 1 times (`error_budget.growth`). Windows beg
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -217,6 +217,7 @@ class WindowCovariance:
     order: int  # m: number of integrations minus one
     # multiplier of the errors: g if a gyro's attitude error projects gravity
     factor: float = 1.0
+    _unit_covariances: dict[Term, Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def weights(self) -> Array:
@@ -231,17 +232,15 @@ class WindowCovariance:
     def of(self, model: NoiseModel) -> Array:
         """Return the covariance of errors by lag in blocks, (lags,), SI^2, of noise only."""
         total = np.zeros(self.lags)
+        pairs = np.correlate(self.weights, self.weights, "full")  # from -(blocks - 1) to blocks - 1
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
         for term in model.terms:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
-                if unit not in self._unit_covariances:
-                    covariance = correlate(
-                        unit.block_covariance(lags, self.window.block), self._autocorrelation
-                    )
-                else:
-                    covariance = self._unit_covariances[unit]
+                covariance = self._unit_covariances.get(unit)
+                if covariance is None:
+                    covariance = correlate(unit.block_covariance(lags, self.window.block), pairs)
                 if unit is not term:  # all models share it
                     self._unit_covariances[unit] = covariance
                 total += power * covariance
@@ -277,12 +276,3 @@ class WindowCovariance:
                     coherence = mean_phasor**2
                 variance += 0.5 * power**2 * coherence
         return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
-
-    @cached_property
-    def _unit_covariances(self) -> dict[Term, Array]:
-        return {}
-
-    @cached_property
-    def _autocorrelation(self) -> Array:
-        """The autocorrelation of the weights, from -(blocks - 1) to blocks - 1."""
-        return np.correlate(self.weights, self.weights, "full")
