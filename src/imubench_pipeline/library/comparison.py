@@ -6,6 +6,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
+from imubench_pipeline.library.drawing import draw_ratios, get_axes
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import cut, summarise
@@ -67,8 +68,6 @@ class Comparison(Sequence[Compared]):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw each ratio with its interval, on a logarithmic axis."""
-        from imubench_pipeline.library.drawing import draw_ratios, get_axes
-
         axes: Axes = get_axes(ax)
         labels = []
         for each in self:

@@ -11,7 +11,7 @@ from imubench_pipeline import allan
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.estimators.rows import make_allan_rows
-from imubench_pipeline.library import given
+from imubench_pipeline.library import drawing, given
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import ByChannel, summarise
 from imubench_pipeline.recordings.recording import ChannelLog
@@ -50,10 +50,8 @@ class Curve(AllanCurve):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the deviation with 95 % limits."""
-        from imubench_pipeline.library.drawing import draw_curves, get_axes
-
-        axes: Axes = get_axes(ax)
-        draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
+        axes: Axes = drawing.get_axes(ax)
+        drawing.draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
         return axes
 
     def to_pandas(self) -> "pd.DataFrame":
@@ -80,14 +78,12 @@ class Curves(ByChannel[Curve]):
 
     def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""
-        from imubench_pipeline.library.drawing import create_panels, draw_curves
-
         by_quantity: dict[str, dict[str, AllanCurve]] = {}
         for channel, curve in self.items():
             by_quantity.setdefault(quantity_of(channel), {})[channel] = curve
-        axes = create_panels([*by_quantity], ax)
+        axes = drawing.create_panels([*by_quantity], ax)
         for panel, (quantity, curves) in zip(axes, by_quantity.items(), strict=True):
-            draw_curves(panel, curves, quantity)
+            drawing.draw_curves(panel, curves, quantity)
         return axes
 
     def to_pandas(self) -> "pd.DataFrame":
@@ -108,9 +104,7 @@ def measured(
 
 
 def _make_row(curve: Curve) -> list[str]:
-    from imubench_pipeline.library.drawing import choose_deviation_unit
-
-    unit = choose_deviation_unit(curve.quantity)
+    unit = drawing.choose_deviation_unit(curve.quantity)
     lowest = int(np.argmin(curve.deviation))
     sign = "" if curve.quantity is None else f" {unit.sign}"
     return [

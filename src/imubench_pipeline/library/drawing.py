@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.navigation.ratios import Ratio
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.palette import assign_sensor_styles
+from imubench_pipeline.report.palette import SUM_LOOK, TERM_LOOKS, TERM_NAMES, assign_sensor_styles
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.words.numbers import Unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from imubench_pipeline.navigation.ratios import Ratio
 
 _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
@@ -72,8 +73,6 @@ def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour
 
 def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
     """Draw a measured curve, the terms of a model, and their sum."""
-    from imubench_pipeline.report.palette import SUM_LOOK, TERM_LOOKS, TERM_NAMES
-
     unit = choose_deviation_unit(quantity)
     draw_measured(axes, curve, unit, "log, 95 % limits", "black")
     for term in model.terms:
@@ -93,7 +92,7 @@ def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str
     _format_axes(axes, unit)
 
 
-def draw_ratios(axes: "Axes", labels: Sequence[str], ratios: Sequence[Ratio]) -> None:
+def draw_ratios(axes: "Axes", labels: Sequence[str], ratios: "Sequence[Ratio]") -> None:
     """Draw ratios with 95 % intervals in rows."""
     places = range(len(ratios), 0, -1)
     for place, ratio in zip(places, ratios, strict=True):

@@ -11,6 +11,7 @@ from imubench_pipeline.datasheets.suspicion import UsualFigures, usual_figures
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
+from imubench_pipeline.library.drawing import create_panels, draw_model, get_axes
 from imubench_pipeline.library.given import Channels, Units, read_columns, read_rate
 from imubench_pipeline.library.logs import Log, ingest_columns
 from imubench_pipeline.library.shown import ByChannel, cut, summarise
@@ -71,8 +72,6 @@ class ChannelEstimate(Estimate):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the measured curve with 95 % limits, the terms of the model, and their sum."""
-        from imubench_pipeline.library.drawing import draw_model, get_axes
-
         axes: Axes = get_axes(ax)
         assert self.measured is not None
         draw_model(axes, self.measured, self.model, self.quantity)
@@ -154,8 +153,6 @@ class Estimates(ByChannel[ChannelEstimate]):
 
     def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw curve and terms of each channel; return the axes, shape (channels,)."""
-        from imubench_pipeline.library.drawing import create_panels
-
         axes = create_panels([*self], ax)
         for panel, estimate in zip(axes, self.values(), strict=True):
             estimate.plot(panel)
