@@ -555,9 +555,6 @@ def test_lines_that_a_datasheet_does_not_have() -> None:
     assert one.rms == pytest.approx(0.0, abs=1e-15)
     assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
     assert curve_rms(list(read_comparables(sheet(), "gyro_x")), tau, adev) == []
-    for wrong in (adev[:1], 0 * adev):
-        with pytest.raises(ValueError, match="expected as many, and deviations above 0"):
-            curve_rms(list(read_comparables(floor, "gyro_x")), tau, wrong)
 
 
 def test_typical_figures_make_the_lines() -> None:

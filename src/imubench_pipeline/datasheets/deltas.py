@@ -165,11 +165,11 @@ class Delta:
     measured: float | None
     lower: float | None
     upper: float | None
-    delta: float | None
-    delta_lower: float | None
-    delta_upper: float | None
     verdict: str
     reasons: tuple[str, ...]
+    delta: float | None = None
+    delta_lower: float | None = None
+    delta_upper: float | None = None
 
 
 def deltas(
@@ -237,9 +237,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         measured=value,
         lower=lower,
         upper=upper,
-        delta=None,
-        delta_lower=None,
-        delta_upper=None,
         verdict="not published" if entry.looked_up else "not looked up",
         reasons=(entry.reason,) if entry.reason else (),
     )
@@ -310,14 +307,8 @@ def curve_rms(
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
     line is used alone. A density of unknown sidedness gives two curves. Typical figures are
     preferred. ``printed``: figures of a channel; ``tau`` and ``adev``, shape (m,): s, and measured
-    Allan deviation, rad/s or m/s². Raises ValueError if the shapes differ, or a deviation is not
-    above 0.
+    Allan deviation above 0, rad/s or m/s².
     """
-    if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
-        raise ValueError(
-            f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
-            "many, and deviations above 0"
-        )
     noises: list[Comparable | None] = [*_select_typical(printed, "N")]
     floors: list[Comparable | None] = [*_select_typical(printed, "adev_minimum")]
     distances = []

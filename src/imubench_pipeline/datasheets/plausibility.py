@@ -129,7 +129,7 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
         convert_to_si(value, figure.unit, "frequency")
         for figure in (sheet.printed("bandwidth") if sheet else ())
         for axis in "xyz"
-        for value in _list_values(figure.on_axis(axis))
+        for value in np.ravel(figure.on_axis(axis) or ()).tolist()
     ]
     return Expected(noise, *_find_max_offset(sensor), max(widest, default=None), printed)
 
@@ -152,12 +152,6 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     if word is None:
         return _MAX_OFFSET, None
     return _MAX_OFFSET_OF_CLASS[word], word
-
-
-def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
-    if printed is None:
-        return ()
-    return printed if isinstance(printed, tuple) else (printed,)
 
 
 def implausible_rates(

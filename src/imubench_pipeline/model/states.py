@@ -3,7 +3,7 @@
 Tables keep the codes; `imubench_pipeline.words` has the words that people read.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 Severity = Literal["note", "warning", "fatal"]
 """Severity of a finding; after a fatal one, the channel or recording is not analysed."""
@@ -61,6 +61,8 @@ Action = Literal[
 
 Measured = Literal["gyro", "accel"]
 """Quantity that a sensor measures."""
+
+MEASURED: tuple[Measured, ...] = get_args(Measured)
 
 NoiseSource = Literal["Q", "N", "flicker", "GM", "K", "R", "line"]
 """Source of an error that is a term of the noise model (`Term.word`)."""
