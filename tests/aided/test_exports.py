@@ -62,12 +62,6 @@ def of_json(content: Any, name: str) -> StateSpace:
     return StateSpace(Phi, Q_d, H, found["R_d"], x0, P0)
 
 
-def of_python(content: Any, name: str) -> StateSpace:
-    module: dict[str, Any] = {"__name__": "noise"}
-    exec(content, module)
-    return StateSpace(*module["matrices"](module["NOISE"][name], module["RATE"]))
-
-
 def of_matlab(content: Any, name: str) -> StateSpace:
     """What an imuSensor does with its figures, as MathWorks describes it ("Algorithms")."""
     code = re.sub(r"%.*", "", content)
@@ -94,7 +88,6 @@ def of_matlab(content: Any, name: str) -> StateSpace:
 LOADED: dict[str, Callable[[Any, str], StateSpace]] = {
     "npz": of_npz,
     "json": of_json,
-    "python": of_python,
     "matlab": of_matlab,
 }
 
@@ -108,8 +101,7 @@ def exported(target: str, models: dict[str, NoiseModel]) -> list[AxisStates]:
     imu = Imu(
         sensor="imu",
         rate=RATE,
-        gyro=AxisNoise(models["gyro"], "a log"),
-        accel=AxisNoise(models["accel"], "a log"),
+        estimated={name: AxisNoise(model, "a log") for name, model in models.items()},
         horizon=HORIZON,
     )
     content = TARGETS[target].write(imu)

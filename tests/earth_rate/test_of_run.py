@@ -263,7 +263,7 @@ def test_the_datasheet_answers_where_no_static_recording_does(tmp_path: Path) ->
     row = by_method(found["earth_rate"])["filter"]
     assert row["status"] == "ok" and row["model"] == "N"
     assert row["model_from"].startswith(
-        "typical figures of the data sheet of s: sheet 1, not measured"
+        "typical figures of the datasheet of s: sheet 1, not measured"
     )
     assert by_method(found["earth_rate"])["known_rate"]["status"] == "given"
 

@@ -1,6 +1,6 @@
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,13 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
-    make_marks,
+    make_mark,
 )
 from imubench_pipeline.extensions.figures.curves import (
     CHARACTERISTIC,
     draw_allan_figure,
     draw_datasheet_figure,
     draw_methods_figure,
-    draw_spectrum_figure,
     draw_terms_figure,
     draw_theory_figure,
 )
@@ -68,15 +67,12 @@ def rows_of(
     simulated: bool = False,
     parameters: dict[str, Parameter] = KNOWN,
     printed: bool = True,
-    found: Sequence[float] = (),
     level: float = 1.0,
 ) -> Rows:
     key = {"sensor": sensor, "recording": recording, "channel": channel}
     method = key | {"method": "likelihood"}
     estimate = Estimate("likelihood", parameters)
     adev = level * np.sqrt(MODEL.allan_variance(TAU))
-    frequency = np.geomspace(1e-4, RATE / 2, 60)
-    fitted = estimate.model.sampled_spectrum(2 * np.pi * frequency / RATE, RATE) / RATE
     figure = {"quantity": "N", "statistic": "N", "printed": 0.005, "unit": "deg/s/sqrt(Hz)",
               "kind": "typ", "verdict": "as printed"}  # fmt: skip
     floor = figure | {"quantity": "bias_instability", "statistic": "adev_minimum", "printed": 8.0,
@@ -104,18 +100,9 @@ def rows_of(
             method | figure | {"sidedness": "two-sided", "comparable": 14 * HOUR},
             method | floor,
         ] * printed,
-        "spectrum": [
-            key | {"frequency": f, "lower": f, "upper": f, "ordinates": 9.0, "density": d,
-                   "fitted": d, "used": number % 5 > 0}
-            for number, (f, d) in enumerate(zip(frequency, fitted, strict=True))
-        ],
         "models": [
             key | {"model": estimate.model.name, "chosen": True, "free": 4, "log_likelihood": 0.0,
                    "bic": 0.0, "aic": 0.0, "weight": 1.0, "verdict": "explained", "bins": 60},
-        ],
-        "lines": [
-            key | {"kind": "sinusoid", "frequency": f, "amplitude": HOUR, "ratio": 30.0}
-            for f in found
         ],
     }  # fmt: skip
 
@@ -215,10 +202,14 @@ def test_undetermined_term_is_marked_not_determined() -> None:
     assert "rate random walk, K = 6 °/h/√h (not determined)" in written(
         made(draw_terms_figure(view))
     )
-    (mark,) = make_marks(view, "K", 0.0)
-    assert (mark.kind, mark.value, mark.lower) == ("not identified", MODEL.K, MODEL.K / 9)
-    figure = draw_forest_figure([view], ["imu"], symbol="K")
-    (dot,) = [each for each in figure.axes[0].lines if each.get_marker() == "o"]
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value, mark.lower) == (
+        "not identified",
+        MODEL.K,
+        MODEL.K / 9,
+    )
+    figure = draw_forest_figure([view], ["imu"])
+    (dot,) = [each for each in figure.axes[-1].lines if each.get_marker() == "o"]
     assert dot.get_markerfacecolor() == "white"
     assert "not determined: fitted value, 95 % limits" in written(figure)
 
@@ -228,12 +219,11 @@ def test_a_channel_without_k() -> None:
     view = view_of(parameters=KNOWN | {"K": Parameter(None, "absent", upper=0.3 * HOUR)})
     (axes,) = made(draw_terms_figure(view)).axes
     assert not [each for each in axes.lines if "random walk, $K$" in str(each.get_label())]
-    assert [(mark.kind, mark.value) for mark in make_marks(view, "K", 0.0)] == [
-        ("limit", 0.3 * HOUR)
-    ]
-    assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"], symbol="K"))
-    nothing = view_of(parameters=KNOWN | {"K": Parameter(None, "absent")})
-    found = written(draw_forest_figure([nothing], ["imu"], symbol="K"))
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value) == ("limit", 0.3 * HOUR)
+    assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"]))
+    nothing = view_of(parameters=dict.fromkeys(KNOWN, Parameter(None, "absent")))
+    found = written(draw_forest_figure([nothing], ["imu"]))
     assert "not in the model" in found and "no recording has a value" in found
 
 
@@ -264,28 +254,6 @@ def test_lines_of_the_datasheet() -> None:
     assert draw_datasheet_figure(view_of(printed=False)) is None
 
 
-@pytest.mark.release
-def test_the_terms_of_the_spectrum_make_the_fit(tmp_path: Path) -> None:
-    figure = made(draw_spectrum_figure(view_of(found=[2.0, 2.1, 30.0])))
-    (axes,) = figure.axes
-    unit = choose_page_unit("gyro", "psd", "practical")
-    terms = [line(axes, name) for name in ("angle random", "bias instability", "rate random")]
-    total = np.sqrt(sum(np.asarray(term.get_ydata()) ** 2 for term in terms))
-    fit = line(axes, "fit by likelihood: N+GM+K")
-    grid = np.asarray(terms[0].get_xdata())
-    found = np.exp(np.interp(np.log(fit.get_xdata()), np.log(grid), np.log(total)))
-    np.testing.assert_allclose(found, fit.get_ydata(), rtol=1e-2)
-    assert value_at(fit, 40.0) == pytest.approx(MODEL.N * unit.per_si, rel=1e-3)
-    shown = texts(figure, tmp_path)
-    assert {"frequency (Hz)", "root of the two-sided density (°/s/√Hz)", "lines (3)"} <= {*shown}
-    assert "bins left out" in shown
-    # Two lines stand too close for both of their names.
-    assert [text for text in shown if text.endswith(" Hz")] == ["2 Hz", "30 Hz"]
-    bare = view_of()
-    bare.spectrum = {}
-    assert draw_spectrum_figure(bare) is None
-
-
 @pytest.mark.parametrize("step", few([4], [1]))
 def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
     rows = rows_of(simulated=True)
@@ -295,7 +263,7 @@ def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
     ]
     views = views_of(rows)
     makers = [make for _, make in (*list_cross_figures(views), *list_channel_figures(views[0]))]
-    assert len(makers) == 7
+    assert len(makers) == 6
     figures = [make() for make in makers[::step]]  # the first kind of each
     every = []
     for figure in figures:
@@ -317,7 +285,7 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
     found = texts(figure, tmp_path)
     assert found.count("imu" if recordings == 1 else f"imu ({recordings} recordings)") == 1
     assert "other" in found and legend_is_clear(figure)
-    forest = draw_forest_figure(views, ["imu", "other"], symbol="N")
+    forest = draw_forest_figure(views, ["imu", "other"])
     assert ("imu" if recordings == 1 else f"imu (n = {recordings})") in written(forest)
     assert legend_is_clear(forest) and forest.get_figheight() * 25.4 < 235.0
     (dots,) = [each for each in forest.axes[0].lines if len(each.get_ydata()) == recordings][:1]
@@ -345,7 +313,7 @@ def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
         (each.get_color(), each.get_linestyle(), each.get_marker()) for each in figure.axes[0].lines
     }
     assert len(looks) == sensors
-    forest = draw_forest_figure(views, names, symbol="N")
+    forest = draw_forest_figure(views, names)
     assert len(forest.axes[0].get_yticklabels()) == sensors
     assert all(text.get_window_extent().x0 >= 0 for text in forest.axes[0].get_yticklabels())
 
@@ -383,9 +351,9 @@ def test_the_same_data_make_the_same_bytes(tmp_path: Path) -> None:
     kinds = ("svg", "pdf")
     before = {key: mpl.rcParams[key] for key in ("font.size", "svg.fonttype", "axes.grid")}
     for kind in kinds:
-        save(draw_forest_figure([usual()], ["imu"], symbol="B"), tmp_path / f"first.{kind}")
+        save(draw_forest_figure([usual()], ["imu"]), tmp_path / f"first.{kind}")
         with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "red"}):
-            save(draw_forest_figure([usual()], ["imu"], symbol="B"), tmp_path / f"second.{kind}")
+            save(draw_forest_figure([usual()], ["imu"]), tmp_path / f"second.{kind}")
         first, second = ((tmp_path / f"{n}.{kind}").read_bytes() for n in ("first", "second"))
         assert first == second
     assert first.startswith(b"%PDF") and b"CreationDate" not in first

@@ -101,8 +101,6 @@ POOLS = [
     of(pools.absent_in, "2 of 5 recordings", 2, 5),
     of(pools.recordings_differ, "the devices differ, or", of_devices=True),
     of(pools.recordings_differ, "differ: the sensor", of_devices=False),
-    of(pools.devices_compared, "more than repeated recordings (p = 0.012)", 0.0123, differ=True),
-    of(pools.devices_compared, "no more than", 0.4, differ=False),
     of(pools.status_reason, "not determined: too short", "not_identified", "too short"),
     of(pools.status_reason, "not in the model", "absent", None),
     of(pools.first_value, "first value with GM", "GM"),
@@ -194,11 +192,11 @@ EXPORTS = [
 ]
 
 SIMULATIONS = [
-    of(simulations.of_data_sheet, "data sheet of s: sheet 1", "s", "sheet 1"),
-    of(simulations.of_data_sheet, "the data sheet of s", "s", None),
+    of(simulations.of_data_sheet, "datasheet of s: sheet 1", "s", "sheet 1"),
+    of(simulations.of_data_sheet, "the datasheet of s", "s", None),
     of(
         simulations.printed_figure,
-        "N 0.01 dps: typ, data sheet (why)",
+        "N 0.01 dps: typ, datasheet (why)",
         "N",
         0.01,
         "dps",

@@ -4,7 +4,7 @@ from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import counted
 
 NO_MODEL = (
-    "the noise of this sensor is not known: no static recording is usable, and its data sheet "
+    "the noise of this sensor is not known: no static recording is usable, and its datasheet "
     "prints no noise. Add a static log of this sensor"
 )
 

@@ -19,7 +19,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel
-from imubench_pipeline.simulate.profiles import SampledProfile
+from imubench_pipeline.simulate.profiles import Profile, make_sampled
 from imubench_pipeline.simulate.simulation import simulate
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
@@ -134,7 +134,7 @@ def compute_true_rate(experiment: Experiment, earth_rate: float, transient: Arra
     return true
 
 
-def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
     """Return the readings of a gyro that is turned by a schedule; the transients differ."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
@@ -155,4 +155,4 @@ def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str
     before = np.full(round(turns.seconds("start") * rate), true[0])
     after = np.full(samples, true[-1])
     sensed = np.concatenate([before, true, after])[:samples]
-    return {str(recording.moved_gyro): SampledProfile(sensed, rate)}
+    return {str(recording.moved_gyro): make_sampled(sensed, rate)}

@@ -10,14 +10,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
-from imubench_pipeline.estimators.estimate import JointDraws, Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, JointDraws, Parameter
 from imubench_pipeline.estimators.rows import make_estimate, read_draws
 from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
 from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow, GradeRow
 from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
-from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
 from imubench_pipeline.navigation.ratios import ComparedChannel, TemperaturePart
 from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings

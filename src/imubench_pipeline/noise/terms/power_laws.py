@@ -12,7 +12,6 @@ from imubench_pipeline.noise.growth import (
     SensorStart,
     Uncalibrated,
     of_constant,
-    of_walk,
     of_white,
     of_white_mean,
 )
@@ -82,10 +81,6 @@ class Quantization(base.Term):
         last = 1.0 if order == 0 else 0.0
         mean = of_constant(order, time) / start.window if isinstance(start, Calibrated) else 0.0
         return self.Q**2 * (last + (first + mean) ** 2 + mean**2)
-
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: it does not grow."""
-        return np.zeros_like(time), np.zeros_like(time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """2 Q^2 / d^2 at k = 0 and -Q^2 / d^2 at 1."""
@@ -243,7 +238,7 @@ class RandomWalk(base.Term):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3), A in the place of W/3 uncalibrated."""
         lag = start.window / 3.0 if isinstance(start, Calibrated) else start.on_time
-        return self.K**2 * (of_walk(order, time) + of_constant(order, time) ** 2 * lag)
+        return self.K**2 * (of_white(order + 1, time) + of_constant(order, time) ** 2 * lag)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """K^2 t^3 / 3 and K^2 t^5 / 20."""
