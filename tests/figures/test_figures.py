@@ -1,6 +1,6 @@
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from imubench_pipeline.extensions.figures.curves import (
     draw_allan_figure,
     draw_datasheet_figure,
     draw_methods_figure,
+    draw_spectrum_figure,
     draw_terms_figure,
     draw_theory_figure,
 )
@@ -67,12 +68,15 @@ def rows_of(
     simulated: bool = False,
     parameters: dict[str, Parameter] = KNOWN,
     printed: bool = True,
+    found: Sequence[float] = (),
     level: float = 1.0,
 ) -> Rows:
     key = {"sensor": sensor, "recording": recording, "channel": channel}
     method = key | {"method": "likelihood"}
     estimate = Estimate("likelihood", parameters)
     adev = level * np.sqrt(MODEL.allan_variance(TAU))
+    frequency = np.geomspace(1e-4, RATE / 2, 60)
+    fitted = estimate.model.sampled_spectrum(2 * np.pi * frequency / RATE, RATE) / RATE
     figure = {"quantity": "N", "statistic": "N", "printed": 0.005, "unit": "deg/s/sqrt(Hz)",
               "kind": "typ", "verdict": "as printed"}  # fmt: skip
     floor = figure | {"quantity": "bias_instability", "statistic": "adev_minimum", "printed": 8.0,
@@ -100,9 +104,18 @@ def rows_of(
             method | figure | {"sidedness": "two-sided", "comparable": 14 * HOUR},
             method | floor,
         ] * printed,
+        "spectrum": [
+            key | {"frequency": f, "lower": f, "upper": f, "ordinates": 9.0, "density": d,
+                   "fitted": d, "used": number % 5 > 0}
+            for number, (f, d) in enumerate(zip(frequency, fitted, strict=True))
+        ],
         "models": [
             key | {"model": estimate.model.name, "chosen": True, "free": 4, "log_likelihood": 0.0,
                    "bic": 0.0, "aic": 0.0, "weight": 1.0, "verdict": "explained", "bins": 60},
+        ],
+        "lines": [
+            key | {"kind": "sinusoid", "frequency": f, "amplitude": HOUR, "ratio": 30.0}
+            for f in found
         ],
     }  # fmt: skip
 
@@ -254,6 +267,28 @@ def test_lines_of_the_datasheet() -> None:
     assert draw_datasheet_figure(view_of(printed=False)) is None
 
 
+@pytest.mark.release
+def test_the_terms_of_the_spectrum_make_the_fit(tmp_path: Path) -> None:
+    figure = made(draw_spectrum_figure(view_of(found=[2.0, 2.1, 30.0])))
+    (axes,) = figure.axes
+    unit = choose_page_unit("gyro", "psd", "practical")
+    terms = [line(axes, name) for name in ("angle random", "bias instability", "rate random")]
+    total = np.sqrt(sum(np.asarray(term.get_ydata()) ** 2 for term in terms))
+    fit = line(axes, "fit by likelihood: N+GM+K")
+    grid = np.asarray(terms[0].get_xdata())
+    found = np.exp(np.interp(np.log(fit.get_xdata()), np.log(grid), np.log(total)))
+    np.testing.assert_allclose(found, fit.get_ydata(), rtol=1e-2)
+    assert value_at(fit, 40.0) == pytest.approx(MODEL.N * unit.per_si, rel=1e-3)
+    shown = texts(figure, tmp_path)
+    assert {"frequency (Hz)", "root of the two-sided density (°/s/√Hz)", "lines (3)"} <= {*shown}
+    assert "bins left out" in shown
+    # Two lines stand too close for both of their names.
+    assert [text for text in shown if text.endswith(" Hz")] == ["2 Hz", "30 Hz"]
+    bare = view_of()
+    bare.spectrum = {}
+    assert draw_spectrum_figure(bare) is None
+
+
 @pytest.mark.parametrize("step", few([4], [1]))
 def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
     rows = rows_of(simulated=True)
@@ -263,7 +298,7 @@ def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
     ]
     views = views_of(rows)
     makers = [make for _, make in (*list_cross_figures(views), *list_channel_figures(views[0]))]
-    assert len(makers) == 6
+    assert len(makers) == 7
     figures = [make() for make in makers[::step]]  # the first kind of each
     every = []
     for figure in figures:

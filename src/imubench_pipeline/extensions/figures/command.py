@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 NEEDED = ("recordings", "allan", "parameters")
 """The tables that every figure needs; the others are optional."""
 
-KINDS = ("comparison", "forest", "allan", "methods", "terms", "datasheet", "theory")
+KINDS = ("comparison", "forest", "allan", "methods", "terms", "datasheet", "spectrum", "theory")
 _KIND_NEEDS = {
     "methods": "an estimate with a model",
     "terms": "an estimate with a model",
     "datasheet": "a printed figure of the channel that is comparable",
+    "spectrum": "the spectrum of the channel",
 }
 """Requirements of each kind besides the curve of a channel."""
 

@@ -29,6 +29,7 @@ CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
     "methods": curves.draw_methods_figure,
     "terms": curves.draw_terms_figure,
     "datasheet": curves.draw_datasheet_figure,
+    "spectrum": curves.draw_spectrum_figure,
 }
 """Figures of one channel of one recording; None where there is nothing to show."""
 
