@@ -100,7 +100,6 @@ def group_columns(contents: Contents) -> list[Group]:
 
 
 def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
-    """Return the groups that are recognised by the names of their columns."""
     # The most specific name of the table or its file that contains a quantity.
     file = PurePosixPath(table.file or contents.path.name)
     titles = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
@@ -173,7 +172,6 @@ def _make_group(
 
 
 def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
-    """Yield the rates with the names p, q and r, if there is no other gyro."""
     if any(group.quantity == "gyro" for group in named):
         return
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
@@ -252,7 +250,6 @@ def choose_columns(contents: Contents) -> Choice:
     in_groups = {id(column) for group in recognised for column in group.columns.values()}
 
     def find_table_clocks(table: LogTable) -> list[Clock]:
-        """Return the columns that may be the time of a table, the most plausible first."""
         columns = list(table.columns)
         if table.file_format.clock_of == "length":
             for other in contents.tables:
@@ -507,7 +504,6 @@ def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
 
 
 def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the temperature to a draft, unless its unit is unknown."""
     (column,) = list(group.columns.values())[:1]
     unit, comment = group.unit, ""
     present = column.values[np.isfinite(column.values)]
