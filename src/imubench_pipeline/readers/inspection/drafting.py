@@ -225,9 +225,7 @@ _QUANTITY_NAMES = {"gyro": "gyro", "accel": "accelerometer", "temperature": "tem
 class Choice:
     """The columns of a log that are used, and the others."""
 
-    gyro: Group | None
-    accel: Group | None
-    temperature: Group | None
+    groups: list[Group]  # gyro, accelerometer and temperature, as far as there are any
     clock: Clock | None
     local: bool  # the time column is in the table of the channels, in each file
     anchor: LogTable | None  # the table whose records or clock all others must share
@@ -291,9 +289,7 @@ def choose_columns(contents: Contents) -> Choice:
     left += [(g, f"another {_QUANTITY_NAMES[g.quantity]}") for g in fitting if g not in selected]
     spoken = in_groups | {id(other.column) for other in ours}
     return Choice(
-        gyro,
-        accel,
-        temperature,
+        selected,
         clock,
         _is_local(selected, clock),
         anchor,
@@ -416,13 +412,10 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
         table = choice.anchor or next(stating, None)
         if table is not None and table.rate is not None:
             drafted.rate = Entry(f"{table.rate:.10g} Hz", "stated in the file")
-    selected = (choice.gyro, choice.accel, choice.temperature)
-    alone = {group.table.file for group in selected if group is not None} == {contents.only}
-    for group in (choice.gyro, choice.accel):
-        if group is not None:
-            _add_group(drafted, group, alone)
-    if choice.temperature is not None:
-        _add_temperature(drafted, choice.temperature, alone)
+    alone = {group.table.file for group in choice.groups} == {contents.only}
+    for group in choice.groups:
+        add = _add_temperature if group.quantity == "temperature" else _add_group
+        add(drafted, group, alone)
     if not drafted.channels:
         several = sum(table.variable is not None for table in contents.tables) > 1
         source = Source(variable=UNKNOWN if several else None, column=UNKNOWN, unit=UNKNOWN)
@@ -443,11 +436,10 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
 
 def _list_unused_tables(contents: Contents, choice: Choice) -> list[str]:
     """Return remarks on the arrays, topics and files of which no column is mentioned otherwise."""
-    groups = [choice.gyro, choice.accel, choice.temperature, *(group for group, _ in choice.left)]
-    used = {id(group.table) for group in groups if group is not None}
-    used |= {id(choice.anchor)} if choice.anchor else set()
-    clocks = [*([choice.clock] if choice.clock else []), *choice.other_clocks]
-    of_time = {id(clock.column) for clock in clocks}
+    groups = [*choice.groups, *(group for group, _ in choice.left)]
+    used = {id(choice.anchor), *(id(group.table) for group in groups)}
+    clocks = [choice.clock, *choice.other_clocks]
+    of_time = {id(clock.column) for clock in clocks if clock is not None}
     by_reason: dict[str, list[str]] = {}
     for table in contents.tables:
         if id(table) in used or of_time & set(map(id, table.columns)):
