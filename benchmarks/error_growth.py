@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.noise.growth import Uncalibrated
@@ -65,7 +66,7 @@ class Case:
     def start(self, rate: float) -> Start:
         """Return the start; a sample stands for the middle of its interval, where a walk begins."""
         if self.levelled:
-            return Start.calibrated(WINDOW, tilt=Levelled(bias=self.stated * ACCEL_BIAS))
+            return Start.calibrated(WINDOW)
         on = partial(Uncalibrated, on_time=WINDOW - 0.5 / rate)
         return Start(
             gyro=on(bias=self.stated * GYRO_BIAS),
@@ -189,8 +190,16 @@ def of_case(runs: int, case: Case) -> list[tuple[str, float]]:
                 square = errors[ORDER[quantity], :, i] ** 2
                 sigma = math.sqrt(float(square.mean()))
                 error = float(square.std()) / math.sqrt(len(square)) / (2.0 * sigma)
+                biased: Figures = {
+                    "turn_on_bias": Figure(sigma=case.stated * ACCEL_BIAS)
+                }  # levelled
                 closed = budget(
-                    quantity, time, gyro=case.gyro, accel=case.accel, start=case.start(rate)
+                    quantity,
+                    time,
+                    gyro=case.gyro,
+                    accel=case.accel,
+                    start=case.start(rate),
+                    accel_figures=biased,
                 ).total
                 difference = (sigma - closed) / max(error, SAMPLING * closed)
                 line = (

@@ -92,7 +92,7 @@ def of_log(number: int, place: int) -> Found:
     white = parameters.get("N_sensor", parameters["N"])
     value = white.value or math.nan
     width = math.nan if white.lower is None or white.upper is None else white.upper - white.lower
-    told = found.low_pass.frequency if found.low_pass is not None else None
+    told = found.frame.low_pass.frequency if found.frame.low_pass is not None else None
     inside = told is not None and told.lower is not None and told.upper is not None
     return Found(
         f"{kind} {order}",

@@ -14,8 +14,9 @@ import argparse
 import math
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
-from imubench_pipeline.simulate.profiles import DayCycle, Profile, Steps, Sum, WarmUp
+from imubench_pipeline.simulate.profiles import Profile, make_day_cycle, make_steps, make_warm_up
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables.keys import Key
 from temperature import behind, bounds
@@ -107,7 +108,30 @@ class Case:
 
     def truth(self) -> Array:
         """Return the true temperature at every sample, °C."""
-        return self.temperature.at(np.arange(self.samples) / self.rate)
+        return self.temperature(np.arange(self.samples) / self.rate)
+
+
+def allan_of_spectrum(
+    spectrum: Callable[[Array], NDArray[Any]], sizes: NDArray[np.int64]
+) -> NDArray[Any]:
+    """Return the Allan variance, shape (m,), of samples of a spectrum that takes rad per sample.
+
+    (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n sin(w/2))^2 dw, by Gauss-Legendre: in octaves up to the
+    first zero of the response to clusters of n samples, then in its periods.
+    """
+    points, weights = np.polynomial.legendre.leggauss(16)
+    variances = []
+    for n in sizes.tolist():
+        end = n * np.pi / 2.0
+        first = min(np.pi, end)
+        edges = np.append(first * 2.0 ** np.arange(-40.0, 1.0), np.arange(2, n // 2 + 1) * np.pi)
+        edges = np.append(edges[edges < end], end)
+        middle, half = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges) / 2.0
+        x = (middle[:, None] + half[:, None] * points).ravel()
+        w = 2.0 * x / n
+        response = 4.0 / np.pi * np.sin(x) ** 4 / (n * np.sin(w / 2.0)) ** 2 / n
+        variances.append((np.outer(half, weights).ravel() * response) @ spectrum(w))
+    return np.array(variances)
 
 
 def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:
@@ -118,17 +142,18 @@ def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:
 def temperature(profile: str, duration: float, rng: np.random.Generator) -> Profile:
     """Return a random temperature of a kind; ``duration`` in s."""
     start = rng.uniform(15.0, 30.0)
-    warm_up = WarmUp(start, start + rng.uniform(5.0, 15.0), rng.uniform(300.0, 1800.0), 0.0)
+    warm_up = make_warm_up(start, start + rng.uniform(5.0, 15.0), rng.uniform(300.0, 1800.0), 0.0)
     period = duration / rng.uniform(0.7, 3.0)
-    day = DayCycle(22.0, rng.uniform(3.0, 8.0), period, rng.uniform(0.0, period))
+    day = make_day_cycle(0.0, rng.uniform(3.0, 8.0), period, rng.uniform(0.0, period))
     if profile == "warm-up":
         return warm_up
     if profile == "day cycle":
-        return day
+        return lambda times: 22.0 + day(times)
     if profile == "steps":
-        begins = np.arange(8) * duration / 8.0
-        return Steps(tuple(begins), tuple(rng.uniform(10.0, 40.0, 8)))
-    return Sum((warm_up, replace(day, mean=0.0)))
+        return make_steps(
+            [k * duration / 8.0 for k in range(8)], rng.uniform(10.0, 40.0, 8).tolist()
+        )
+    return lambda times: warm_up(times) + day(times)
 
 
 def case(number: int) -> Case:
@@ -327,7 +352,7 @@ def bound_of(made: Case) -> tuple[float, float]:
     spectrum = np.exp(np.interp(np.log(omega), np.log(places), np.log(density)))
     truth, lag, s = made.truth(), model.drift.lag, model.drift.sensitivity
     bound = bounds(spectrum, truth, made.rate, lag, 0.0)[0]
-    if not isinstance(made.temperature, Steps) or s == 0.0:
+    if made.profile != "steps" or s == 0.0:
         return bound, bound
     columns = [behind(truth, made.rate, lag)]
     if lag > 0.0:
@@ -359,8 +384,10 @@ def of_model(number: int) -> list[dict[str, object]]:
         again = found.model(made.rate)
         curve_again = curve_of(simulated(made, again, 2, Path(folder)), LONGEST)
         curve_twin = curve_of(simulated(made, made.model, 3, Path(folder)), LONGEST)
-    true_variance = made.model.allan_variance(measured.tau, made.rate)
-    variance = again.allan_variance(measured.tau, made.rate)
+    true_variance, variance = (
+        allan_of_spectrum(partial(each.sampled_spectrum, rate=made.rate), measured.cluster_size)
+        for each in (made.model, again)
+    )
     truths, parameters = true_figures(made, found), found.parameters(made.model.noise)
     drift, low_pass = made.model.drift, made.model.low_pass
     assert drift is not None and low_pass is not None  # every case has them

@@ -35,7 +35,7 @@ def test_the_degrees_are_those_of_the_fitted_model(found: Likelihood) -> None:
     assert set(limited.edf_source) == {FITTED}
     model = found.estimates[0].model
     expected = compute_degrees_of_freedom(model, 1.0, curve.cluster_size, len(LOG))
-    np.testing.assert_allclose(limited.edf, expected.edf, rtol=0.1)
+    np.testing.assert_allclose(limited.edf, expected[0], rtol=0.1)
     # Near the hump there are fewer than the power law there has.
     hump = np.argmax(limited.variance * (limited.tau > 20.0))
     assert limited.edf[hump] < 0.9 * curve.edf[hump]
@@ -66,7 +66,7 @@ def test_where_few_clusters_are_left_a_walk_may_be_larger_than_its_estimate(
         replace(model, K=(model.K + upper) / 2.0), 1.0, curve.cluster_size[few], len(LOG)
     )
     assert limited.edf_upper is not None
-    np.testing.assert_allclose(limited.edf_upper[few], larger.upper, rtol=0.05)
+    np.testing.assert_allclose(limited.edf_upper[few], larger[1], rtol=0.05)
     unknown = replace(found.estimates[0], parameters={})
     alone = add_fitted_limits(curve, replace(found, estimates=[unknown, *found.estimates[1:]]))
     assert alone.edf_upper is not None

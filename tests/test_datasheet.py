@@ -60,7 +60,7 @@ def test_table_4_of_the_first_paper_both_ways() -> None:
     assert one.comparable == pytest.approx(8.64e-5, rel=1e-3)
     assert one.delta == pytest.approx(-0.03, abs=0.005)
     assert one.verdict == "as printed"
-    assert "assumed, as the data sheet does not state it" in "; ".join(one.reasons)
+    assert "assumed, as the datasheet does not state it" in "; ".join(one.reasons)
 
 
 def test_the_accelerometer_of_the_same_table() -> None:
@@ -555,9 +555,6 @@ def test_lines_that_a_datasheet_does_not_have() -> None:
     assert one.rms == pytest.approx(0.0, abs=1e-15)
     assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
     assert curve_rms(list(read_comparables(sheet(), "gyro_x")), tau, adev) == []
-    for wrong in (adev[:1], 0 * adev):
-        with pytest.raises(ValueError, match="expected as many, and deviations above 0"):
-            curve_rms(list(read_comparables(floor, "gyro_x")), tau, wrong)
 
 
 def test_typical_figures_make_the_lines() -> None:

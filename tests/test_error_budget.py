@@ -15,12 +15,12 @@ from scipy.special import ndtri
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget, time_until
+from imubench_pipeline.navigation.error_budget.budget import Start, budget, time_until
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Quantity
-from imubench_pipeline.navigation.error_budget.uncertainty import compute_interval, draw_models
+from imubench_pipeline.navigation.error_budget.uncertainty import compute_limits, draw_models
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.words.verdicts import source_text
 from tests.starts import uncalibrated
 
@@ -108,9 +108,10 @@ def test_more_noise_is_never_better(
 
 
 def test_a_levelled_tilt_is_the_mean_error_of_the_accelerometer_over_g() -> None:
-    start = Start.calibrated(25.0, tilt=Levelled(bias=0.03))
+    start = Start.calibrated(25.0)
     accel = NoiseModel(N=1e-3)
-    found = budget("attitude", 10.0, gyro=NOTHING, accel=accel, start=start)
+    biased: Figures = {"turn_on_bias": Figure(sigma=0.03)}
+    found = budget("attitude", 10.0, gyro=NOTHING, accel=accel, start=start, accel_figures=biased)
     sigma = {source_text(one.source): one.sigma for one in found.contributions}
     assert sigma == {
         "initial tilt from accel N": pytest.approx(1e-3 / 5.0 / G),
@@ -180,29 +181,6 @@ def test_what_schuler_feedback_takes_off_white_noise() -> None:
         asked = LATE[-len(overstated) :]
         flat = [budget(q, 600.0, **models, start=start).total for q in asked]
         np.testing.assert_allclose(np.array(flat) / curved - 1.0, overstated, atol=6e-4)
-
-
-@pytest.mark.parametrize("time", [0.0, -1.0, math.nan, math.inf])
-def test_a_time_that_is_none_is_refused(time: float) -> None:
-    with pytest.raises(ValueError, match="time"):
-        budget("attitude", time, gyro=NOTHING, accel=NOTHING, start=Start.calibrated(1.0))
-    with pytest.raises(ValueError, match="time"):
-        Gyrocompass(gyro=NOTHING, latitude=0.0).heading(time)
-
-
-def test_bad_starts_are_refused() -> None:
-    with pytest.raises(ValueError, match="quantity"):
-        budget("way", 1.0, gyro=NOTHING, accel=NOTHING, start=Start.calibrated(1.0))  # type: ignore[arg-type]  # wrong on purpose
-    with pytest.raises(ValueError, match="window"):
-        Start.calibrated(0.0)
-    with pytest.raises(ValueError, match="on_time"):
-        uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=-1.0)
-    with pytest.raises(ValueError, match="tilt"):
-        Start.calibrated(1.0, tilt=-0.1)
-    with pytest.raises(ValueError, match="bias"):
-        Levelled(bias=math.nan)
-    with pytest.raises(ValueError, match="levelled"):
-        Start(gyro=Calibrated(1.0), accel=Uncalibrated(bias=0.0, on_time=0.0), tilt=Levelled())
 
 
 # Errors in the horizontal plane
@@ -313,8 +291,6 @@ def test_limits_that_are_passed_at_once_or_never() -> None:
     assert time_until(0.05, attitude) == 0.0
     assert time_until(0.2, attitude) is None
     assert time_until(0.1 * G * 7.0, velocity) == pytest.approx(7.0)
-    with pytest.raises(ValueError, match="limit"):
-        time_until(0.0, attitude)
 
 
 # Gyrocompassing
@@ -380,17 +356,6 @@ def test_a_stated_bias_adds_to_the_noise() -> None:
     assert turned.total == 0.0
 
 
-def test_bad_gyrocompasses_are_refused() -> None:
-    with pytest.raises(ValueError, match="latitude"):
-        Gyrocompass(gyro=NOTHING, latitude=math.pi / 2.0)
-    with pytest.raises(ValueError, match="bias"):
-        Gyrocompass(gyro=NOTHING, latitude=0.0, bias=-1.0)
-    with pytest.raises(ValueError, match="positions"):
-        Gyrocompass(gyro=NOTHING, latitude=0.0, positions=3)
-    with pytest.raises(ValueError, match="accuracy"):
-        Gyrocompass(gyro=NOTHING, latitude=0.0).time_needed(0.0)
-
-
 # Uncertainty
 
 
@@ -437,14 +402,6 @@ def test_the_interval_of_a_budget() -> None:
     start = Start.calibrated(10.0)
     budgets = [budget("heading", 5.0, gyro=m, accel=NOTHING, start=start) for m in models]
     best = budget("heading", 5.0, gyro=estimate.model, accel=NOTHING, start=start).total
-    lower, upper = compute_interval(budgets)
+    lower, upper = compute_limits([each.total for each in budgets], best)
     assert lower == pytest.approx(0.8 * best, rel=0.03)
     assert upper == pytest.approx(1.5 * best, rel=0.03)
-
-
-def test_budgets_that_do_not_go_together_have_no_interval() -> None:
-    one = Budget(1.0, "velocity", [Contribution(ErrorSource("N", "gyro"), 1.0)])
-    other = Budget(1.0, "position", [Contribution(ErrorSource("N", "gyro"), 1.0)])
-    for budgets in ([], [one, other]):
-        with pytest.raises(ValueError, match="one quantity"):
-            compute_interval(budgets)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.in_use import Figure
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import (
     GaussMarkov,
@@ -104,7 +105,8 @@ def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
     rest = round(BEFORE * RATE)
     normal = rng.standard_normal((3, RUNS))
     if levelled:
-        start = Start.calibrated(BEFORE, tilt=Levelled(bias=0.05, on_time=0.0))
+        start = Start.calibrated(BEFORE)
+        of_accel = {"turn_on_bias": Figure(sigma=0.05)}
         forces += 0.05 * normal[0][:, None]
         # The accelerometer at rest reads its error, and the tilt is set as if it were gravity.
         tilt = -forces[:, :rest].mean(axis=1) / G
@@ -113,6 +115,7 @@ def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
         start = uncalibrated(
             gyro_bias=2e-3, accel_bias=0.05, on_time=BEFORE - 0.5 / RATE, tilt=3e-3
         )
+        of_accel = {}
         tilt = 3e-3 * normal[0]
         rates += 2e-3 * normal[1][:, None]
         forces += 0.05 * normal[2][:, None]
@@ -127,7 +130,9 @@ def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
     for time in TIMES:
         for quantity, runs in errors.items():
             found, error = spread(runs[:, round(time * RATE) - 1])
-            expected = budget(quantity, time, gyro=gyro, accel=accel, start=start).total
+            expected = budget(
+                quantity, time, gyro=gyro, accel=accel, start=start, accel_figures=of_accel
+            ).total
             assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, quantity)
 
 

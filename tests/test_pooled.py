@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import f_oneway
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.navigation.pooled import Pool, estimate_turn_on_bias, list_pooled_rows, pool
-from imubench_pipeline.words.numbers import number_text
 from tests.conftest import few
 
 Z = 1.959963984540054
@@ -285,22 +283,10 @@ def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Gen
         )
         for factor, spread in ((1.0, 0.005), (0.0, 0.1))
     )
-    for name in ("N", "bias"):
-        assert set(key[0] for key in apart) == {None, "x", "y", "z"}
-        assert "differ more than repeated" in "; ".join(apart[None, "gyro_x", name]["reasons"])
-        assert "no more than" in "; ".join(alike[None, "gyro_x", name]["reasons"])
+    assert set(key[0] for key in apart) == {None, "x", "y", "z"}
     assert apart[None, "gyro_x", "N"]["verdict"] == "differ"
     assert apart["y", "gyro_x", "N"]["verdict"] == "agree"
     assert alike["y", "gyro_x", "N"]["verdict"] == "differ"
-
-
-def test_devices_are_compared_by_analysis_of_variance(rng: np.random.Generator) -> None:
-    groups = [rng.normal(0.3 * size, 0.2, size) for size in (2, 3, 4)]
-    names = [(f"{i}-{j}", str(i), y) for i, group in enumerate(groups) for j, y in enumerate(group)]
-    rows = [parameter(name, value=float(np.exp(y))) for name, _, y in names]
-    found = by_key(list_pooled_rows(rows, [], {("S", name): device for name, device, _ in names}))
-    expected = f_oneway(*groups).pvalue
-    assert f"(p = {number_text(expected, 2)})" in "; ".join(found[None, "gyro_x", "N"]["reasons"])
 
 
 def test_one_recording_a_device_cannot_tell_which() -> None:

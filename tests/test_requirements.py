@@ -41,6 +41,7 @@ def test_limits_are_in_si(tmp_path: Path) -> None:
         ({"limits": [{"error": "north", "after": "1 s", "at_most": "1 deg"}]}, "needs 'latitude'"),
         ({"static_window": None}, "either 'static_window' or 'turn_on'"),
         ({"turn_on": {"gyro": "1 deg/s", "accel": "1 mg"}}, "either 'static_window' or 'turn_on'"),
+        ({"static_window": None, "turn_on": {"gyro": "-1 deg/s"}}, "a standard deviation from 0"),
         ({"latitude": "91 deg"}, "between the poles: there cos φ is 0, and a gyro"),
         ({"environment": {"temperature_change": "-20 K"}}, "a difference above zero"),
         ({"environment": {"turns": "10 m"}}, "environment.turns"),

@@ -112,11 +112,6 @@ def test_a_weak_term_that_is_there_has_its_part_of_the_draws() -> None:
     assert part == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
 
 
-def test_without_a_share_there_is_nothing_to_draw() -> None:
-    with pytest.raises(ValueError, match="shares above 0"):
-        draw_jointly([], LONGEST)
-
-
 def test_fewer_draws_are_spread_over_all_and_more_repeat_them(rng) -> None:
     N = np.linspace(1.0, 2.0, 200)[:, None]
     drawn = draw_jointly([(Terms("N"), posterior(N), 1.0)], LONGEST)

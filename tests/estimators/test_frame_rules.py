@@ -60,8 +60,8 @@ def test_n_behind_a_steep_filter_is_that_of_the_log_at_low_frequencies() -> None
     rng = np.random.default_rng(3)
     white = 1e-3 * np.sqrt(RATE) * rng.standard_normal(102_000)
     found = fit(sosfilt(butter(4, 19.0, output="sos", fs=RATE), white)[2000:], RATE)
-    assert found.low_pass is not None
-    assert (found.low_pass.kind, found.low_pass.order) == ("bilinear", 4)
+    assert found.frame.low_pass is not None
+    assert (found.frame.low_pass.kind, found.frame.low_pass.order) == ("bilinear", 4)
     for name in ("N", "N_sensor"):
         parameter = found.estimates[0].parameters[name]
         assert parameter.value == pytest.approx(1e-3, rel=0.02)

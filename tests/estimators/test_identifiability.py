@@ -212,9 +212,7 @@ def test_the_ordinates_of_an_ideal_spectrum_are_those_of_a_log(
     assert mean == pytest.approx(spacing * (count + 1) / 2)
 
 
-def test_a_log_without_an_ordinate_in_the_band_has_no_bounds() -> None:
-    with pytest.raises(ValueError, match="no ordinate"):
-        compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, 0.4, 1.0)
+def test_one_ordinate_in_the_band_has_a_bound() -> None:
     assert compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, 0.6, 1.0)["N"] == pytest.approx(
         1 / np.sqrt(2)
     )

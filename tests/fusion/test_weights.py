@@ -6,10 +6,9 @@ from scipy.optimize import minimize
 
 from imubench_pipeline.extensions.fusion.board import Board, Parts, Shared
 from imubench_pipeline.extensions.fusion.weights import (
-    ByFrequency,
-    Constant,
-    best_constant,
-    equal,
+    at_fused_rate,
+    best_weights,
+    fuse,
     least,
 )
 from imubench_pipeline.noise import NoiseModel
@@ -20,8 +19,7 @@ BOARD = Board([GOOD, POOR, GOOD], [100.0, 100.0, 200.0])
 
 
 def test_the_weights_for_white_noise_are_the_inverse_variances() -> None:
-    assert best_constant(BOARD).values == pytest.approx([9 / 19, 1 / 19, 9 / 19])
-    assert equal(4).values == pytest.approx([0.25] * 4)
+    assert best_weights(BOARD) == pytest.approx([9 / 19, 1 / 19, 9 / 19])
 
 
 @pytest.mark.parametrize("shared", [(), (Shared(NoiseModel(K=1e-3), [1e-3, 3e-3, 2e-3]),)])
@@ -30,20 +28,10 @@ def test_no_other_constant_weights_have_a_lower_allan_variance(shared: tuple[Sha
     parts = board.allan_parts([30.0])
 
     def variance(two: np.ndarray) -> float:
-        w = np.array([[*two, 1.0 - two.sum()]])
-        return float(parts.of_sum(w).sum()) * 1e9
+        return float(np.sum(parts.of_sum(np.array([*two, 1.0 - two.sum()])))) * 1e9
 
     found = minimize(variance, [0.3, 0.3], method="Nelder-Mead", options={"xatol": 1e-9})
-    assert best_constant(board, 30.0).values[:2] == pytest.approx(found.x, abs=1e-4)
-
-
-def test_the_weights_by_frequency_are_the_inverse_spectra() -> None:
-    omega = np.geomspace(1e-7, np.pi, 50)
-    weights = ByFrequency(BOARD).response(omega)
-    spectra = BOARD.spectral_parts(omega).own
-    assert weights == pytest.approx((1 / spectra) / (1 / spectra).sum(axis=1, keepdims=True))
-    assert weights[-1, 1] == pytest.approx(1 / 19, rel=1e-3)  # as for white noise
-    assert weights[0, 1] == pytest.approx(1.0, abs=1e-2)  # one sensor does not walk
+    assert best_weights(board, 30.0)[:2] == pytest.approx(found.x, abs=1e-4)
 
 
 @given(st.floats(-12.0, 12.0), st.integers(0, 1000))
@@ -78,21 +66,30 @@ def test_what_is_large_is_taken_off_where_two_see_it_unlike() -> None:
 
 
 def test_weights_pass_the_signal_unchanged() -> None:
-    with pytest.raises(ValueError, match="sum of 1"):
-        Constant(np.array([0.5, 0.4]))
-    with pytest.raises(ValueError, match="sum of 1"):
-        Constant(np.array([0.5, np.nan]))
+    for wrong in ([0.5, 0.4], [0.5, np.nan], [0.5, 0.5, 0.0]):
+        with pytest.raises(ValueError, match="sum of 1"):
+            fuse(TWO_RATES, np.array(wrong), [np.zeros(8)] * 2)
 
 
 def test_the_weights_for_a_tau_below_half_a_sample_are_those_for_one_sample() -> None:
-    assert best_constant(BOARD, 0.004).values == pytest.approx(best_constant(BOARD, 0.01).values)
-
-
-def test_no_sensors_have_no_weights() -> None:
-    with pytest.raises(ValueError, match="0 sensors"):
-        equal(0)
+    assert best_weights(BOARD, 0.004) == pytest.approx(best_weights(BOARD, 0.01))
 
 
 def test_a_sensor_without_noise_is_refused() -> None:
     with pytest.raises(ValueError, match="without noise"):
-        best_constant(Board([GOOD, NoiseModel(K=1e-6)], [1.0, 1.0]))
+        best_weights(Board([GOOD, NoiseModel(K=1e-6)], [1.0, 1.0]))
+
+
+TWO_RATES = Board([NoiseModel(N=1e-4)] * 2, [100.0, 200.0])
+
+
+def test_a_faster_sensor_is_brought_to_the_fused_rate_by_means_of_blocks() -> None:
+    found = at_fused_rate(TWO_RATES, [np.array([1.0, 2.0]), np.array([1.0, 3.0, 5.0, 9.0, 4.0])])
+    assert found.tolist() == [[1.0, 2.0], [2.0, 7.0]]
+
+
+@pytest.mark.parametrize("logs", [1, 3])
+def test_a_wrong_number_of_logs_is_said(logs: int) -> None:
+    samples = [np.zeros(8)] * logs
+    with pytest.raises(ValueError, match=f"found samples of {logs} sensors, expected 2"):
+        fuse(TWO_RATES, np.array([0.5, 0.5]), samples)

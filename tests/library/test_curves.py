@@ -133,7 +133,6 @@ def test_what_cannot_be_used_says_why(data: object, arguments: dict, expected: s
 def test_curves_are_shown_drawn_and_given_as_tables(samples: np.ndarray) -> None:
     curves = imu.allan_variance(samples, RATE)
     assert "gyro_x   31   0.1 s" in repr(curves) and len(repr(curves)) < 1000
-    assert curves._repr_html_().count("<tr>") == 7
     table = curves.to_pandas()
     assert list(table.columns[:4]) == ["channel", "unit", "tau", "adev"]
     assert table.unit.unique().tolist() == ["rad/s", "m/s^2"]

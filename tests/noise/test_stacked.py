@@ -1,6 +1,7 @@
 """Many models at once: as each of them alone."""
 
 import math
+from operator import methodcaller
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from imubench_pipeline.noise.exponentials import (
     integrate_squared_response,
 )
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
-from imubench_pipeline.noise.model import stack_models, sum_over_terms
+from imubench_pipeline.noise.model import stack_models, sum_over_stacked_terms
 
 MODELS = [
     NoiseModel(Q=1e-6, N=1e-4, B=2e-5, T_B=90.0, K=1e-7, R=-1e-9),
@@ -23,15 +24,20 @@ MODELS = [
 ]
 
 
+def over_models(figure, places: int | None = None) -> np.ndarray:
+    return sum_over_stacked_terms(len(MODELS), stack_models(MODELS), figure, places)
+
+
 def test_a_figure_of_many_models_is_that_of_each() -> None:
     for start in (Calibrated(60.0), Uncalibrated(bias=0.0, on_time=5.0)):
         for order in (0, 1, 2):
             for time in (1.0, 600.0):
                 alone = [math.fsum(t.growth(order, time, start) for t in m.terms) for m in MODELS]
-                at_once = sum_over_terms(MODELS, lambda t: np.asarray(t.growth(order, time, start)))  # noqa: B023  # called at once
+                growth = methodcaller("growth", order, time, start)
+                at_once = over_models(growth)
                 np.testing.assert_allclose(at_once, alone, rtol=1e-12)
     taus = np.array([0.1, 3.0, 700.0])
-    at_once = sum_over_terms(MODELS, lambda term: term.allan_variance(taus[:, None]), len(taus))
+    at_once = over_models(lambda term: term.allan_variance(taus[:, None]), len(taus))
     np.testing.assert_allclose(at_once.T, [m.allan_variance(taus) for m in MODELS], rtol=1e-12)
 
 

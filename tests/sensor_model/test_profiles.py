@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.settings.profile_forms import Surroundings
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.simulate.profiles import FileSeries, profiles_of
+from imubench_pipeline.simulate.profiles import profiles_of
 from imubench_pipeline.units import UnitError, parse_difference
 
 
@@ -21,8 +21,8 @@ def profiles(settings: dict, folder: Path = Path()):
 def test_no_times_have_no_values(tmp_path: Path) -> None:
     (tmp_path / "turn.csv").write_text("time,gyro_z\n0,1\n1,2\n")
     motion, _ = profiles({"motion": {"gyro_z": {"form": "file", "file": "turn.csv"}}}, tmp_path)
-    assert motion["gyro_z"].at(np.empty(0)).shape == (0,)
-    assert motion["gyro_z"].at(np.array([0.5])) == pytest.approx([1.5])
+    assert motion["gyro_z"](np.empty(0)).shape == (0,)
+    assert motion["gyro_z"](np.array([0.5])) == pytest.approx([1.5])
 
 
 def test_formulas_are_what_they_say_in_si() -> None:
@@ -39,8 +39,8 @@ def test_formulas_are_what_they_say_in_si() -> None:
             }
         }
     )
-    np.testing.assert_allclose(motion["gyro_z"].at(t), [0, 0, np.pi, np.pi, np.pi])
-    np.testing.assert_allclose(motion["accel_z"].at(t), 9.80665)
+    np.testing.assert_allclose(motion["gyro_z"](t), [0, 0, np.pi, np.pi, np.pi])
+    np.testing.assert_allclose(motion["accel_z"](t), 9.80665)
     _, day = profiles(
         {
             "temperature": {
@@ -48,10 +48,10 @@ def test_formulas_are_what_they_say_in_si() -> None:
             }
         }
     )  # fmt: skip
-    np.testing.assert_allclose(day.at(t)[[0, 4]], [20.0, 25.0])
+    np.testing.assert_allclose(day(t)[[0, 4]], [20.0, 25.0])
     warm = {"form": "warm_up", "start": "293.15 K", "end": "40 degC", "time_constant": "1 h"}
     _, warming = profiles({"temperature": warm | {"begin": "60 s"}})
-    found = warming.at(t)
+    found = warming(t)
     np.testing.assert_allclose(found[:3], 20.0)
     assert found[3] == pytest.approx(40 - 20 * np.exp(-3540 / 3600))
 
@@ -71,7 +71,7 @@ def test_a_sum_is_a_value_and_what_is_added_to_it() -> None:
     _, total = profiles({"temperature": {"form": "sum", "parts": [warm, day, step]}})
     expected = 25 + np.exp(-t / 200) + 0.4 * np.cos(2 * np.pi * (t - 21600) / 86400)
     expected[2:] -= 3
-    np.testing.assert_allclose(total.at(t), expected, rtol=1e-12)
+    np.testing.assert_allclose(total(t), expected, rtol=1e-12)
 
 
 def test_a_sum_of_differences_does_not_depend_on_their_unit() -> None:
@@ -80,7 +80,7 @@ def test_a_sum_of_differences_does_not_depend_on_their_unit() -> None:
     def total(first: str, added: str) -> np.ndarray:
         parts = [{"form": "constant", "value": value} for value in (first, added)]
         _, found = profiles({"temperature": {"form": "sum", "parts": parts}})
-        return found.at(t)
+        return found(t)
 
     np.testing.assert_allclose(total("20 degC", "5 K"), 25.0)
     np.testing.assert_allclose(total("293.15 K", "5 degC"), 25.0)
@@ -127,29 +127,10 @@ def test_a_file_is_interpolated_in_blocks_of_any_size(
     motion, _ = profiles({"motion": {"gyro_x": {"form": "file", "file": path.name}}}, path.parent)
     times = np.cumsum(rng.uniform(0, 2, sum(sizes)))
     ends = np.cumsum([0, *sizes])
-    parts = [motion["gyro_x"].at(times[a:b]) for a, b in pairwise(ends)]
+    parts = [motion["gyro_x"](times[a:b]) for a, b in pairwise(ends)]
     wanted = np.interp(times, t, np.radians(v))
     np.testing.assert_allclose(np.concatenate(parts), wanted, atol=1e-11)
-    np.testing.assert_allclose(motion["gyro_x"].at(times[:3]), wanted[:3], atol=1e-11)  # back
-
-
-@pytest.mark.release
-def test_a_long_csv_file_is_read_as_a_stream(tmp_path: Path) -> None:
-    path = tmp_path / "long.csv"
-    rows = 300_000
-    t = np.arange(rows) / 100
-    lines = "\n".join(f"{a:.2f},{b:.6f}" for a, b in zip(t, np.sin(t), strict=True))
-    path.write_text(f"time,temperature\n{lines}\n")
-    series = FileSeries(path)
-    series.take("temperature", "temperature")
-    most = 0
-    for begin in range(0, 3000, 100):
-        times = begin + np.arange(0, 100, 0.005)
-        found = series.at("temperature", times)
-        np.testing.assert_allclose(found, np.interp(times, t, np.sin(t)), atol=1e-6)
-        most = max(most, len(series._window["time"]))
-    assert most < 150_000  # of 300,000
-    assert series.span() == (0.0, t[-1])
+    np.testing.assert_allclose(motion["gyro_x"](times[:3]), wanted[:3], atol=1e-11)  # back
 
 
 @pytest.mark.parametrize(
@@ -175,4 +156,4 @@ def test_a_file_that_cannot_be_used_is_refused(tmp_path: Path, text: str, said: 
     settings = {"temperature": {"form": "file", "file": "warm.csv"}}
     with pytest.raises(ConfigError, match=said):
         _, warm = profiles(settings, tmp_path)
-        warm.at(np.array([0.0, 5.0]))
+        warm(np.array([0.0, 5.0]))

@@ -41,9 +41,3 @@ def test_lagged_stays_within_the_range_of_the_temperature(lag):
 
 def test_no_lag_changes_nothing():
     assert np.array_equal(apply_lag(TIMES, VALUES, 0.0), VALUES)
-
-
-@pytest.mark.parametrize("lag", [-1.0, np.nan, np.inf])
-def test_a_lag_that_is_no_time_is_refused(lag):
-    with pytest.raises(ValueError, match="lag"):
-        apply_lag(TIMES, VALUES, lag)

@@ -150,19 +150,12 @@ def deviation_limits(
 
 
 def match_variance(weights: Array) -> float:
-    """Return the degrees of freedom of the chi-squared variate with the same relative variance.
-
-    The weights have shape (m,).
-    """
+    """Return the degrees of freedom with the relative variance of weights of shape (m,)."""
     return float(weights.sum() ** 2 / (weights @ weights))
 
 
 def match_lower_tail(weights: Array) -> float:
-    """Return the degrees of freedom of the chi-squared variate with the same lower tail.
-
-    Relative to its mean it has the same 2.5 % quantile. The weights w_i >= 0, shape (m,), have any
-    common factor.
-    """
+    """Return the degrees of freedom with the 2.5 % tail of a sum; weights of shape (m,)."""
     if len(weights) == 1:
         return 1.0
     quantile = find_lower_quantile(weights, _LOWER_TAIL)

@@ -242,10 +242,7 @@ def _sum_squares_twice(
 
 @njit(cache=True, nogil=True)
 def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
-    """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
-
-    ``sizes``: points in a cluster. ``sums``: changed in place.
-    """
+    """Add the squared second differences from points ``start`` to ``stop`` to ``sums``, by size."""
     j = 0
     while j < sizes.size:
         n = sizes[j]
@@ -375,11 +372,7 @@ class Presence:
     gaps: Gaps
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
-        """Return a mask of the valid differences of means of n samples, and their stride.
-
-        The mask is for differences that begin a stride apart, in the whole log, or in its beginning
-        if that has enough clusters. None: no resolution is enough.
-        """
+        """Return a mask of valid differences of means of n, and their stride; None: too coarse."""
         if n >= _STARTS_PER_CLUSTER // 2 * self.stride:
             counts, base = self.coarse, self.stride
         elif len(self.first) - 1 >= min(2 * _MIN_CLUSTERS * n, self.samples):

@@ -25,11 +25,7 @@ def count_threads(threads: int | None) -> int:
 def run_in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
-    """Return the results of work on all pieces, computed in threads and joined in order.
-
-    ``work`` receives the first and one-past-last piece, and returns arrays with one row per piece.
-    It must release the global interpreter lock.
-    """
+    """Return the joined rows of ``work(first, end)`` on all pieces; it must release the GIL."""
     threads = max(1, min(threads, pieces))
     if threads == 1:
         return work(0, pieces)

@@ -102,10 +102,6 @@ class AllanCurve:
         sources = [s for s, chosen in zip(self.edf_source, points, strict=True) if chosen]
         return replace(self, **columns, edf_source=sources)
 
-    def up_to(self, part: float) -> Array:
-        """Return the tau up to a part of the log, s."""
-        return self.tau[self.cluster_size <= part * self.samples]
-
     def limits(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
         return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)
@@ -263,10 +259,7 @@ def of_phase(
     gaps: Gaps = NO_GAPS,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`).
-
-    The result has the same bits for any number of threads.
-    """
+    """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`)."""
     wanted = _check_arguments(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 

@@ -16,11 +16,7 @@ _OF_FIGURE = {"unit", "option", "condition", "place", "evidence"}
 
 
 def list_catalogue(sensors: Mapping[str, Sensor]) -> Iterator[CatalogueRow]:
-    """Yield the figures of all sensors, in the order of the sensors and of the keys of a file.
-
-    There is one row for each number, and one for each figure that is not published or not looked
-    up.
-    """
+    """Yield a row for each figure of all sensors, or number of it, in the order of the files."""
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet
         sheet: QuantityDatasheet | None = getattr(datasheet, quantity)

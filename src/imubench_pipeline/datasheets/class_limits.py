@@ -172,10 +172,7 @@ def count_sensors_within(quantity: str, figure: str, largest: float) -> tuple[in
 
 
 def read_sigma(sensor: Sensor, quantity: str, figure: str) -> float | None:
-    """Return a printed figure as one standard deviation of the worst axis, SI.
-
-    The noise figures are as printed, typical or maximum. None if an axis has no such figure.
-    """
+    """Return a printed figure, SI, as 1 sigma of the worst axis; None if an axis has none."""
     if getattr(sensor.datasheet, quantity) is None:
         return None
     axes = [list(_list_statements(sensor, f"{quantity}_{axis}", figure)) for axis in "xyz"]

@@ -150,10 +150,7 @@ class PrintedAxis:
 
 
 def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
-
-    Rows have no figure if none is published or looked up.
-    """
+    """Yield the printed N, bias instability, K and T_B of a channel, SI; rows may lack a figure."""
     axis = PrintedAxis.of(datasheet, channel)
     walk = Comparable("N", "N", None, reason=texts.WALK_IS_DENSITY)
     rms_to_si = axis.si("rms_noise")

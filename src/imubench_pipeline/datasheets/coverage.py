@@ -40,11 +40,7 @@ KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[CoverageRow]:
-    """Return which figures the vendors of a catalogue publish.
-
-    There is one row for each sensor that is sold, quantity that it measures, and figure, in the
-    order of the sensors.
-    """
+    """Return a row for each sensor that is sold, quantity that it measures, and figure."""
     rows = []
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet

@@ -23,7 +23,7 @@ from imubench_pipeline.estimators.curve_bias import compute_curve_figures
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
-from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.printed import Datasheet, PrintedFigure
 from imubench_pipeline.words.reasons import datasheets as texts
 from imubench_pipeline.words.reasons.pools import status_reason
 
@@ -165,11 +165,11 @@ class Delta:
     measured: float | None
     lower: float | None
     upper: float | None
-    delta: float | None
-    delta_lower: float | None
-    delta_upper: float | None
     verdict: str
     reasons: tuple[str, ...]
+    delta: float | None = None
+    delta_lower: float | None = None
+    delta_upper: float | None = None
 
 
 def deltas(
@@ -229,7 +229,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         printed=entry.printed,
         unit=figure.unit if figure else None,
         kind=figure.kind if figure else None,
-        condition=figure.condition if figure else None,
+        condition=_describe_condition(figure) if figure else None,
         sidedness=entry.sidedness,
         comparable=entry.value,
         comparable_lower=entry.lower,
@@ -237,9 +237,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         measured=value,
         lower=lower,
         upper=upper,
-        delta=None,
-        delta_lower=None,
-        delta_upper=None,
         verdict="not published" if entry.looked_up else "not looked up",
         reasons=(entry.reason,) if entry.reason else (),
     )
@@ -310,14 +307,8 @@ def curve_rms(
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
     line is used alone. A density of unknown sidedness gives two curves. Typical figures are
     preferred. ``printed``: figures of a channel; ``tau`` and ``adev``, shape (m,): s, and measured
-    Allan deviation, rad/s or m/s². Raises ValueError if the shapes differ, or a deviation is not
-    above 0.
+    Allan deviation above 0, rad/s or m/s².
     """
-    if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
-        raise ValueError(
-            f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
-            "many, and deviations above 0"
-        )
     noises: list[Comparable | None] = [*_select_typical(printed, "N")]
     floors: list[Comparable | None] = [*_select_typical(printed, "adev_minimum")]
     distances = []
@@ -338,3 +329,9 @@ def _select_typical(printed: Sequence[Comparable], statistic: str) -> list[Compa
     with_value = [row for row in printed if row.statistic == statistic and row.value is not None]
     typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL_KINDS]
     return typical or with_value
+
+
+def _describe_condition(figure: PrintedFigure) -> str | None:
+    """Return the condition of a figure, with the averaging time of an Allan deviation."""
+    tau = figure.tau and f"τ = {figure.tau}"
+    return ", ".join(filter(None, (tau, figure.condition))) or None

@@ -106,7 +106,7 @@ class Expected:
 
     noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
     offset: float = _MAX_OFFSET  # largest mean of a gyro that an offset explains, rad/s
-    offset_of: str | None = None  # "data sheet" or the price class that limits it; None: any gyro
+    offset_of: str | None = None  # "datasheet" or the price class that limits it; None: any gyro
     bandwidth: float | None = None  # the widest that is printed, Hz
     printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
 
@@ -129,7 +129,7 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
         convert_to_si(value, figure.unit, "frequency")
         for figure in (sheet.printed("bandwidth") if sheet else ())
         for axis in "xyz"
-        for value in _list_values(figure.on_axis(axis))
+        for value in np.ravel(figure.on_axis(axis) or ()).tolist()
     ]
     return Expected(noise, *_find_max_offset(sensor), max(widest, default=None), printed)
 
@@ -146,18 +146,12 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     ]
     if printed:
         largest = min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET)
-        return largest, "data sheet"
+        return largest, "datasheet"
     words = (sensor.price_class or "").lower().replace(",", " ").split()
     word = next((word for word in words if word in _MAX_OFFSET_OF_CLASS), None)
     if word is None:
         return _MAX_OFFSET, None
     return _MAX_OFFSET_OF_CLASS[word], word
-
-
-def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
-    if printed is None:
-        return ()
-    return printed if isinstance(printed, tuple) else (printed,)
 
 
 def implausible_rates(

@@ -67,10 +67,7 @@ def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]
 
 
 def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
-    """Return the printed N and B of a sensor, SI, from the first axis that has them.
-
-    B is the minimum of the Allan deviation, as vendors print it.
-    """
+    """Return the printed N and B (minimum of the curve), SI, from the first axis that has them."""
     figures: dict[str, float] = {}
     for axis in "xyz":
         rows = read_comparables(sensor.datasheet, f"{quantity}_{axis}")
@@ -125,11 +122,7 @@ def suspicious(
 def unusual_rows(
     parameters: Iterable[ParameterRow], sensors: Mapping[str, Sensor], usual: UsualFigures
 ) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` about estimates far from the printed figures.
-
-    ``parameters`` are rows of that table, ``sensors`` are by name, and ``usual`` is from a
-    catalogue.
-    """
+    """Yield the rows of the table ``findings`` about estimates far from the printed figures."""
     for row in parameters:
         # Vendors print the minimum of the Allan deviation as B.
         figure = {"N": "N", "sigma_min": "B"}.get(row.parameter)

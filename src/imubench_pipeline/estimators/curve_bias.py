@@ -99,8 +99,8 @@ def compute_curve_bias(models: Models, longest: float) -> tuple[Array, Array]:
     return np.sqrt(squared[rows, highest]), tau[rows, highest]
 
 
-def compute_allan_variances(models: Models, tau: Array) -> Array:
-    """Return the Allan variance of models at averaging times of shape (m,), shape (d, m)."""
+def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the lowest point of the Allan deviation of models (see `locate_minimum`)."""
     variance = (
         3.0 * models.parameter("Q")[:, None] ** 2 / tau**2
         + models.parameter("N")[:, None] ** 2 / tau
@@ -110,23 +110,15 @@ def compute_allan_variances(models: Models, tau: Array) -> Array:
     for B, T_B in zip(models.biases.T, models.times.T, strict=True):
         shape = evaluate_gauss_markov_shape(tau / T_B[:, None], 1.0)
         variance = variance + (FLOOR * B[:, None]) ** 2 * shape / _PEAK_SHAPE
-    return np.asarray(variance)
+    return locate_minimum(np.log(variance), tau)
 
 
-def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the lowest point of the Allan deviation of models.
+def locate_minimum(level: Array, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the lowest points of Allan deviations, from logarithms of variances, shape (d, m).
 
     ``tau``, shape (m,), is evenly spaced in the logarithm, s; a parabola interpolates between its
     points. Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s,
     and whether it is a minimum, and not an end of ``tau``.
-    """
-    return locate_minimum(np.log(compute_allan_variances(models, tau)), tau)
-
-
-def locate_minimum(level: Array, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the lowest points of logarithms of Allan variances, shape (d, m).
-
-    Arguments and results are as in `find_lowest_point`.
     """
     rows = np.arange(len(level))
     lowest = level.argmin(axis=1)

@@ -15,7 +15,8 @@ from imubench_pipeline.allan.phase import Presence, Span
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.whittle import make_noise_model
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.spectral_degrees import Degrees, compute_degrees_of_freedom
+from imubench_pipeline.noise.spectral_degrees import compute_degrees_of_freedom
+from imubench_pipeline.typing import Array
 
 _MIN_CLUSTERS = 100
 _MIN_TAU_TIMES_BAND = 1.0  # Below it the curve contains frequencies that were not fitted
@@ -40,25 +41,24 @@ def add_fitted_limits(
     sinusoids = [line.term for line in likelihood.lines if line.narrow]
     model = replace(make_noise_model(chosen.maximum), sinusoids=sinusoids)
 
-    def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> Degrees:
+    def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> tuple[Array, Array]:
         sizes, log = curve.cluster_size[points], (curve.samples, segments, presence)
         return compute_degrees_of_freedom(model, rate, sizes, *log, curve.share[points])
 
-    degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
-    upper = degrees.upper
+    edf, upper = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
     walk = likelihood.estimates[0].parameters.get("K")
     most_walk = walk.upper if walk is not None else None
     few = curve.cluster_size * _MIN_CLUSTERS > curve.samples
     if most_walk is not None and most_walk > model.K and few.any():
         walking = replace(model, K=(model.K + most_walk) / 2.0)
-        upper[few] = np.minimum(upper[few], degrees_at(walking, few).upper)
+        upper[few] = np.minimum(upper[few], degrees_at(walking, few)[1])
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
         doubtful |= curve.tau * likelihood.band.highest < _MIN_TAU_TIMES_BAND
-    fitted = ~doubtful | (degrees.edf < curve.edf)
+    fitted = ~doubtful | (edf < curve.edf)
     return replace(
         curve,
-        edf=np.where(fitted, degrees.edf, curve.edf),
+        edf=np.where(fitted, edf, curve.edf),
         edf_upper=np.where(fitted, upper, curve.edf_upper),
         edf_source=tuple(FITTED if is_fitted else POWER_LAW for is_fitted in fitted),
     )

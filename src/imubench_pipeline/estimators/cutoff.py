@@ -128,7 +128,7 @@ def find_cutoff(
     if beside_rounding < -_MIN_GAIN:
         return absent
     lower, upper = found.frequency.lower or 0.0, found.frequency.upper or math.inf
-    return Cutoff(_withhold(found.frequency, texts.filter_or_quantization(lower, upper)))
+    return Cutoff(found.frequency.withheld(texts.filter_or_quantization(lower, upper)))
 
 
 def _describe_filter(spectrum: Spectrum, fits: "_Fits", tried: "Sequence[_Trial]") -> Cutoff:
@@ -149,9 +149,9 @@ def _describe_filter(spectrum: Spectrum, fits: "_Fits", tried: "Sequence[_Trial]
     share = (best.floor / best.N) ** 2
     if not fits.explains(best):
         reason = texts.unknown_filter(len(_MAX_CUTOFFS))
-        frequency, N = _withhold(frequency, reason), _withhold(N, reason)
+        frequency, N = frequency.withheld(reason), N.withheld(reason)
     elif max(cutoffs) > _MAX_LIMIT_RATIO * min(cutoffs):
-        frequency = _withhold(frequency, texts.cutoff_range(min(cutoffs), max(cutoffs)))
+        frequency = frequency.withheld(texts.cutoff_range(min(cutoffs), max(cutoffs)))
     found = Cutoff(frequency, best.low_pass.kind, best.low_pass.order, N)
     if share > _MIN_FLOOR_RATIO and N.status == "ok" and N.upper is not None:
         times = math.sqrt(1.0 + share)
@@ -165,11 +165,6 @@ def _describe_filter(spectrum: Spectrum, fits: "_Fits", tried: "Sequence[_Trial]
         floor=best.N * math.sqrt(beside),
         gain=gain / (float(best.low_pass.white(0.0, rate)) + beside),
     )
-
-
-def _withhold(parameter: Parameter, reason: str) -> Parameter:
-    fitted = parameter.value
-    return replace(parameter, value=None, status="not_identified", reason=reason, fitted=fitted)
 
 
 @dataclass(frozen=True)
@@ -224,10 +219,7 @@ class _Fits:
         )
 
     def try_filters(self) -> list[_Trial]:
-        """Return the maxima of the likelihood over all filters, sorted by BIC, best first.
-
-        A floor is tried only where no filter explains the spectrum without one.
-        """
+        """Return the maxima over all filters by BIC, best first; with a floor if none explains."""
         maxima: list[_Trial] = []
         for with_floor in (False, True):
             for each in _MAX_CUTOFFS:

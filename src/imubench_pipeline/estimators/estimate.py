@@ -1,6 +1,6 @@
 """Result of every estimator: parameters with their status, and their noise model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -116,12 +116,14 @@ class Parameter:
             reason = texts.wide_interval(far / near)
         else:
             reason = texts.interval_with_zero(at_limit=signs == 0)
-        fitted = self.in_model
         # The prior, and not the data, decides how far down such draws reach.
         is_open = signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near
-        lower = 0.0 if is_open else self.lower
-        status: Status = "not_identified"
-        return replace(self, value=None, status=status, reason=reason, lower=lower, fitted=fitted)
+        return replace(self.withheld(reason), lower=0.0 if is_open else self.lower)
+
+    def withheld(self, reason: str) -> "Parameter":
+        """Return the parameter, ``not_identified``, with its value as ``fitted``."""
+        fitted = self.in_model
+        return replace(self, value=None, status="not_identified", reason=reason, fitted=fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,16 +142,9 @@ class JointDraws:
     def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
         """Return the noise model of a draw, numbered from 0, with lines beside the noise."""
         Q, N, B, T_B, K, R = self.first[number].tolist()
-        return NoiseModel(
-            Q=Q,
-            N=N,
-            B=B,
-            T_B=T_B if T_B > 0.0 else None,
-            K=K,
-            R=R,
-            further=[GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0],
-            sinusoids=sinusoids,
-        )
+        time = T_B if T_B > 0.0 else None
+        further = [GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0]
+        return NoiseModel(Q=Q, N=N, B=B, T_B=time, K=K, R=R, further=further, sinusoids=sinusoids)
 
 
 @dataclass(frozen=True)
@@ -184,19 +179,24 @@ class Estimate:
             for name, parameter in group.items():
                 yield number, name, parameter
 
+    def revised(self, change: Callable[[str, Parameter], Parameter]) -> "Estimate":
+        """Return the estimate with changed parameters of the first component and of the curve."""
+        parameters, curve = (
+            {name: change(name, each) for name, each in group.items()}
+            for group in (self.parameters, self.curve)
+        )
+        return replace(self, parameters=parameters, curve=curve)
+
     @property
     def model(self) -> NoiseModel:
         """The noise model of the parameters that have a value, or are fitted."""
         values = {name: parameter.in_model for name, parameter in self.parameters.items()}
+        amplitudes = {name: values.get(name) or 0.0 for name in ("Q", "N", "B", "K", "R")}
         pairs = [(group["B"].in_model, group["T_B"].in_model) for group in self.further]
         waves = [(group["amplitude"].in_model, group["frequency"].in_model) for group in self.lines]
         return NoiseModel(
-            Q=values.get("Q") or 0.0,
-            N=values.get("N") or 0.0,
-            B=values.get("B") or 0.0,
+            **amplitudes,
             T_B=values.get("T_B"),
-            K=values.get("K") or 0.0,
-            R=values.get("R") or 0.0,
             further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
             sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )

@@ -61,25 +61,21 @@ class FitSelection:
         return texts.band_text(self.band.source, self.band.highest, low_pass)
 
     @property
-    def gain(self) -> Array:
-        """Density of white noise behind the filter over its density at 0 Hz, shape (b,)."""
-        return np.ones(len(self.used)) if self._gain is None else self._gain
-
-    @property
-    def _gain(self) -> Array | None:
+    def gain(self) -> Array | None:
+        """Density of white noise over its density at 0 Hz, shape (b,); None without a filter."""
         return self.low_pass.gain if self.low_pass is not None else None
 
     def whittle(self, spectrum: Spectrum, *, all_bins: bool = False) -> Whittle:
         """Return the likelihood of the bins that are fitted, or roughly of all."""
         if not all_bins:
             spectrum = spectrum.select(self.used)
-        samples = _MIN_CORRELATION_SAMPLES if self._gain is None else MIN_PROCESS_SAMPLES
+        samples = _MIN_CORRELATION_SAMPLES if self.gain is None else MIN_PROCESS_SAMPLES
         shapes, shortest = COARSE if all_bins else SHAPES, samples / spectrum.rate
         return make_whittle(spectrum, self.band.highest, shapes, shortest=shortest)
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise is visible: no filter, and a sufficient band."""
-        return self._gain is None and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
+        return self.gain is None and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
 
     def _limit(self, spectrum: Spectrum, highest: float, source: BandSource) -> "FitSelection":
         """Return the selection up to a frequency, Hz."""

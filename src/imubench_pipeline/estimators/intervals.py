@@ -26,11 +26,7 @@ _DURATION_RATIOS = np.geomspace(1e-4, 1e4, 17)  # Durations tried over the durat
 
 
 def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
-    """Return the Cramér-Rao bound of each parameter of a fit, relative to it.
-
-    Shape (m,): the parameters in the order of `Maximum.powers`, then T_B, then R; infinite for a
-    term that is 0.
-    """
+    """Return relative Cramér-Rao bounds, (m,), of `Maximum.powers`, T_B and R; infinite for 0."""
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp
@@ -47,14 +43,9 @@ def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
 
 
 def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
-    """Return the bins of a gapless log of a duration, up to a frequency, without data.
-
-    Raises ValueError if no ordinate lies below the frequency.
-    """
+    """Return the bins of a gapless log of a duration, up to a frequency, without data."""
     samples = math.floor(rate * duration + 1e-6)
     count = min(math.floor(2.0 * highest * duration + 1e-6), samples - 1)
-    if count < 1:
-        raise ValueError(f"a log of {duration:.3g} s has no ordinate up to {highest:.3g} Hz")
     edges = list(range(1, min(SINGLE, count) + 1))
     while edges[-1] < count:
         edges.append(min(max(edges[-1] + 1, int(edges[-1] * WIDTH)), count))
@@ -82,10 +73,7 @@ def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectru
 def compute_cramer_rao_bounds(
     model: NoiseModel, rate: float, duration: float, highest: float
 ) -> dict[str, float]:
-    """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
-
-    The keys are as in `list_parameter_names`. Rate and highest frequency used are in Hz.
-    """
+    """Return relative Cramér-Rao bounds by `list_parameter_names`; rate and ``highest`` in Hz."""
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter, value in values.items() if value > 0)
     processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
@@ -111,11 +99,7 @@ def list_parameter_names(terms: Terms) -> list[str]:
 def find_durations_needed(
     maximum: Maximum, rate: float, duration: float, highest: float
 ) -> list[float | None]:
-    """Return the log duration, s, that determines each parameter to `TARGET_RELATIVE_ERROR`.
-
-    In the order of `compute_relative_bounds`; None where 10,000 times the duration does not
-    suffice. Rate and highest frequency used are in Hz.
-    """
+    """Return log durations, s, that determine each parameter to a tenth; None if none does."""
     lengths = duration * _DURATION_RATIOS
     lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * maximum.terms.parameters]
     errors = [

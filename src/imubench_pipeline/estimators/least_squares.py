@@ -51,7 +51,13 @@ class UnfitCurveError(ValueError):
     """An Allan variance to which no model can be fitted; the text says why."""
 
 
-def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
+def fit(
+    curve: AllanCurve,
+    *,
+    method: Method = "weighted",
+    longest: float = 1 / 9,
+    with_limits: bool = True,
+) -> Estimate:
     """Fit N, B, T_B and K to an Allan variance.
 
     C = sum_i w_i (variance_i - model(tau_i))^2 with
@@ -64,27 +70,13 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     ``longest`` is the longest tau of the fit, as a part of the log. The shortest is where the curve
     begins to follow a model of its longer tau: the sensor's own filter bends it before.
 
-    The parameters are in SI, with 95 % limits from the covariance of the Allan variances.
+    The parameters are in SI, with 95 % limits from the covariance of the Allan variances. Without
+    limits, which take most of the time, no parameter is ``not_identified``.
     ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the search, which
     goes as far as the process still peaks inside the tau used; ``not_identified``: the log cannot
     determine the value (`add_limits`). Raises UnfitCurveError if fewer than four points lie within
     ``longest``, or the Allan variance is 0 at one; ValueError if the method is not known.
     """
-    return add_limits(*_solved(curve, method, longest))
-
-
-def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
-    """Fit N, B, T_B and K as `fit` does, without limits, which take most of its time.
-
-    Parameters, errors and statuses are as in `fit`, except for ``not_identified``.
-    """
-    return _solved(curve, method, longest)[0]
-
-
-def _solved(
-    curve: AllanCurve, method: Method, longest: float
-) -> tuple[Estimate, AllanCurve, NDArray[np.bool_]]:
-    """Return the estimate without limits, the curve, and the tau that were fitted."""
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _MIN_POINTS:
         raise UnfitCurveError(texts.few_points(int(used.sum()), longest, _MIN_POINTS))
@@ -98,7 +90,8 @@ def _solved(
     if first > 0 and parameters["N"].value is not None:
         reason = texts.fitted_from(float(curve.tau[first]))
         parameters["N"] = replace(parameters["N"], reason=reason)
-    return Estimate(method, parameters), curve, used
+    estimate = Estimate(method, parameters)
+    return add_limits(estimate, curve, used) if with_limits else estimate
 
 
 def _find_first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
@@ -422,8 +415,7 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
             )
     bias = parameters["B"]
     if bias.status == "ok" and model.T_B is not None and model.T_B < BROADBAND_TIME:
-        reason = texts.broadband_process(model.T_B)
-        bias = replace(bias, value=None, status="not_identified", reason=reason, fitted=model.B)
+        bias = bias.withheld(texts.broadband_process(model.T_B))
     return Estimate(
         estimate.method,
         parameters,

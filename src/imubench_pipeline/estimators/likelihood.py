@@ -15,7 +15,6 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
 from imubench_pipeline.estimators import least_squares, missing, white_level
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
-from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
@@ -72,11 +71,6 @@ class Likelihood:
     fitted: Array
     """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
-
-    @property
-    def low_pass(self) -> Cutoff | None:
-        """The sensor's own low-pass filter; None if it was not searched for."""
-        return self.frame.low_pass
 
 
 def fit(
@@ -204,33 +198,24 @@ def fit_spectrum(
     of_papers = _InTheLog(whittle, frame, posteriors, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
     noise = frame.whittle(spectrum, all_bins=True).density(chosen.maximum)
-    fitted = noise * frame.gain + chosen.maximum.ramp**2 * spectrum.ramp
-    doubt = None
-    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
-        names = chosen.terms.name, papers.terms.name
-        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
+    gain = 1.0 if frame.gain is None else frame.gain
+    fitted = noise * gain + chosen.maximum.ramp**2 * spectrum.ramp
     sinusoids = select_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
     parameters = {name: gauss_markov.parameters[name] for name in PARAMETERS}
-    gauss_markov = replace(
-        gauss_markov,
-        parameters=_cast_doubt(parameters, doubt),
-        curve=_cast_doubt(gauss_markov.curve, doubt),
-        lines=sinusoids,
-        draws=of_papers.draw_jointly(),
-    )
+    draws = of_papers.draw_jointly()
+    gauss_markov = replace(gauss_markov, parameters=parameters, lines=sinusoids, draws=draws)
+    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
+        names = chosen.terms.name, papers.terms.name
+        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
+
+        def cast_doubt(name: str, each: Parameter) -> Parameter:
+            is_doubted = each.status == "ok" and name != "N"
+            return replace(each, status="doubtful", reason=doubt) if is_doubted else each
+
+        gauss_markov = gauss_markov.revised(cast_doubt)
     both, lines, used = (estimate, gauss_markov), frame.lines, frame.used
     return Likelihood(both, candidates, lines, frame.band, spectrum, used, fitted, frame)
-
-
-def _cast_doubt(group: Mapping[str, Parameter], reason: str | None) -> dict[str, Parameter]:
-    """Return parameters, all but N of status ``ok`` made doubtful if there is a reason."""
-    return {
-        name: replace(each, status="doubtful", reason=reason)
-        if reason is not None and each.status == "ok" and name != "N"
-        else each
-        for name, each in group.items()
-    }
 
 
 class _InTheLog:

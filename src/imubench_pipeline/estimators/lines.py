@@ -49,11 +49,7 @@ MAX_LINES = 16  # Lines that are used individually; the weaker ones together are
 
 @dataclass(frozen=True)
 class Line:
-    """A detected spectral line, with 95 % limits.
-
-    A band of noise is wider than a sinusoid, or not significantly above its neighbourhood; an alias
-    is the image of a faster line in block means.
-    """
+    """A line with 95 % limits; a band of noise is wide, an alias the image of a faster line."""
 
     frequency: float  # Hz
     frequency_lower: float
@@ -82,11 +78,7 @@ class Line:
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the spectral lines of a log, sorted by frequency.
-
-    ``spectra`` are of block means for frequencies up to ``crossover``, Hz, and of samples above, or
-    one only; ``model`` is fitted to the spectrum, and a median over neighbouring bins corrects it.
-    """
+    """Return the lines by frequency; block means serve up to ``crossover``, Hz, samples above."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0

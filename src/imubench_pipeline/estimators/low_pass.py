@@ -86,11 +86,7 @@ class Filter:
         return np.asarray(sampled * total)
 
     def half_power(self, rate: float) -> float:
-        """Return the frequency at which the density of filtered white noise is halved.
-
-        It equals ``cutoff`` except for a boxcar, whose side lobes alias: it is 0.155 of the rate
-        for the running mean of three samples, and 0.148 for the mean over that time.
-        """
+        """Return the frequency, Hz, at which filtered white noise is halved; a boxcar aliases."""
         if self.kind != "boxcar":
             return self.cutoff
         half = 0.5 * float(self.white(0.0, rate))

@@ -341,11 +341,8 @@ def draw_jointly(
 
     They are selected at equal distances of the cumulative weight (systematic resampling without a
     random start). ``parts`` are the models that the log does not exclude, with unnormalised
-    weights; ``longest`` is the longest correlation time that the log can determine, s. Raises
-    ValueError if there is no model, or no weight above 0.
+    weights; ``longest`` is the longest correlation time that the log can determine, s.
     """
-    if not sum(share for _, _, share in parts) > 0.0:
-        raise ValueError("expected models with shares above 0")
     most = max(terms.gauss_markov for terms, _, _ in parts)
     counts = [len(posterior.parameters) for _, posterior, _ in parts]
     firsts, others = [], []

@@ -44,35 +44,18 @@ def weights(error: Array) -> Array:
 
 
 def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
-    """Return the RMS over the last axis of the difference of two curves, or of many and one.
-
-    Allan deviations or their logarithms, shape (..., m); ``weight``, shape (m,), of sum 1, or
-    equal.
-    """
+    """Return the RMS over the last axis of differences of curves; weights of shape (m,), sum 1."""
     return np.asarray(np.sqrt(np.average((one - other) ** 2, axis=-1, weights=weight)))
 
 
 def beats(one: Array, other: Array) -> float:
-    """Return the probability that a draw of the first kind has the lower RMS of two.
-
-    ``one`` and ``other``, shape (k,) and (l,), are the RMS of single draws of each kind.
-    """
+    """Return the probability that a draw of one, shape (k,), has a lower RMS than of other."""
     place = np.searchsorted(np.sort(other), one, side="right")
     return float(1.0 - np.mean(place) / other.size)
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Score a model against a measured curve.
-
-    ``measured``, rad/s or m/s², its relative standard ``error``, and ``model`` are Allan
-    deviations, shape (m,); ``draws``, shape (k, m), are of simulated logs. Raises ValueError if the
-    shapes differ.
-    """
-    if not measured.shape == error.shape == model.shape == draws.shape[1:]:
-        raise ValueError(
-            f"shapes differ: measured {measured.shape}, error {error.shape}, model {model.shape}, "
-            f"draws {draws.shape}"
-        )
+    """Score a model against a curve and its relative error, shape (m,), SI, by draws (k, m)."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

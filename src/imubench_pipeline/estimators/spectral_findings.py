@@ -1,8 +1,7 @@
 """Findings on the spectrum of a channel: lines, a low-pass filter, missing slow noise."""
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.special import chdtr
@@ -101,13 +100,9 @@ def find_missing_slow_noise(
 def withhold_slow_noise(estimate: Estimate) -> Estimate:
     """Return an estimate of a log that lacks slow noise: K is unknown, and nothing is absent."""
 
-    def withhold(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
-        return {
-            name: Parameter(None, "not_identified", texts.SLOW_NOISE_MISSING, fitted=one.value)
-            if name == "K" or (one.status == "absent" and name != "Q")
-            else one
-            for name, one in group.items()
-        }
+    def withhold(name: str, one: Parameter) -> Parameter:
+        if name == "K" or (one.status == "absent" and name != "Q"):
+            return Parameter(None, "not_identified", texts.SLOW_NOISE_MISSING, fitted=one.value)
+        return one
 
-    parameters, curve = withhold(estimate.parameters), withhold(estimate.curve)
-    return replace(estimate, parameters=parameters, curve=curve)
+    return estimate.revised(withhold)

@@ -174,24 +174,19 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
     """Average ordinates in bins: the lowest stay single, then each is 5 % wide."""
     order = np.argsort(ordinates[0], kind="stable")
     frequency, density, ramp, cross, length = (column[order] for column in ordinates)
-    edges = make_bin_edges(frequency)
+    edges, columns = make_bins(frequency, length)
     counts = np.diff(np.append(edges, len(frequency)))
-    last = edges + counts - 1
-    return {
-        "frequency": np.add.reduceat(frequency, edges) / counts,
-        "lower": frequency[edges] - 0.25 / length[edges],
-        "upper": frequency[last] + 0.25 / length[last],
+    return columns | {
         "ordinates": counts.astype(np.float64),
         "density": np.add.reduceat(density, edges) / counts,
         "block": np.full(len(edges), block),
-        "length": np.add.reduceat(length, edges) / counts,
         "ramp": np.add.reduceat(ramp, edges) / counts,
         "cross": np.add.reduceat(cross, edges) / counts,
     }
 
 
-def make_bin_edges(frequency: Array) -> NDArray[np.int64]:
-    """Return the first ordinate of each bin."""
+def make_bins(frequency: Array, length: Array) -> tuple[NDArray[np.int64], dict[str, Array]]:
+    """Return the first ordinate of each bin, and columns of the spectrum that follow from them."""
     edges = list(range(min(SINGLE, len(frequency))))
     while edges[-1] + 1 < len(frequency):
         beyond = np.searchsorted(frequency, frequency[edges[-1]] * WIDTH * (1 - 1e-12))
@@ -199,7 +194,15 @@ def make_bin_edges(frequency: Array) -> NDArray[np.int64]:
         if following >= len(frequency):
             break
         edges.append(following)
-    return np.array(edges, dtype=np.int64)
+    first = np.array(edges, dtype=np.int64)
+    counts = np.diff(np.append(first, len(frequency)))
+    last = first + counts - 1
+    return first, {
+        "frequency": np.add.reduceat(frequency, first) / counts,
+        "lower": frequency[first] - 0.25 / length[first],
+        "upper": frequency[last] + 0.25 / length[last],
+        "length": np.add.reduceat(length, first) / counts,
+    }
 
 
 def _high_bins(

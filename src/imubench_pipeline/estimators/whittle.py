@@ -35,10 +35,7 @@ _MAX_BLOCK_OVER_TIME = 1e-3  # Below this block duration over T_B, a process loo
 
 
 class Shapes:
-    """Mean densities of unit terms in the bins of a spectrum, in SI^2/Hz.
-
-    The spectrum of block means is the folded spectrum of the samples.
-    """
+    """Mean densities of unit terms in bins, SI^2/Hz; block means have a folded spectrum."""
 
     def __init__(self, spectrum: Spectrum) -> None:
         self._interval = 1.0 / spectrum.rate
@@ -196,11 +193,7 @@ class Maximum:
 
 
 class Whittle:
-    """The likelihood of one spectrum.
-
-    The shape of a Gauss-Markov process is tabulated at ``shapes`` correlation times, from the
-    ``shortest`` to the ``longest`` that are searched, s.
-    """
+    """The likelihood of one spectrum, with ``shapes`` correlation times between two, s."""
 
     def __init__(
         self, spectrum: Spectrum, shortest: float, longest: float, shapes: int = SHAPES
@@ -331,11 +324,7 @@ class Whittle:
 def make_whittle(
     spectrum: Spectrum, highest: float, shapes: int = SHAPES, *, shortest: float | None = None
 ) -> Whittle:
-    """Return the likelihood of a spectrum, with the correlation times that it can show.
-
-    ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
-    correlation time, s, by default twenty sampling intervals; ``shapes``: from `Whittle`.
-    """
+    """Return the likelihood of bins up to ``highest``, Hz, and of T_B from ``shortest``, s."""
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest
     least = max(least, 1.0 / (np.pi * highest))

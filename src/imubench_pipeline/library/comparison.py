@@ -6,9 +6,10 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
+from imubench_pipeline.library.drawing import draw_ratios, get_axes
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.library.shown import cut, summarise
 from imubench_pipeline.navigation import ratios
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings, Method
@@ -48,7 +49,7 @@ class Compared:
         return symbol_text(self.symbol) if self.tau is None else f"σ({self.tau:g} s)"
 
 
-class Comparison(Shown, Sequence[Compared]):
+class Comparison(Sequence[Compared]):
     """Noise parameters and Allan deviations of logs, as ratios with 95 % intervals.
 
     A verdict depends on a single 95 % interval: of twenty comparisons of equal sensors, about one
@@ -67,8 +68,6 @@ class Comparison(Shown, Sequence[Compared]):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw each ratio with its interval, on a logarithmic axis."""
-        from imubench_pipeline.library.drawing import draw_ratios, get_axes
-
         axes: Axes = get_axes(ax)
         labels = []
         for each in self:
@@ -105,7 +104,7 @@ class Comparison(Shown, Sequence[Compared]):
             for each in self
         )
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         heads = ["channel", "", "a", "b", "unit", "a / b", "95 % interval", "verdict", "because"]
         several = len(self.names) > 2
         rows = []
@@ -126,7 +125,7 @@ class Comparison(Shown, Sequence[Compared]):
             heads = ["a / b of", *heads]
         a, b, *more = self.names
         title = f"{a} (a) and {b} (b)" if not more else ", ".join(self.names)
-        return Summary(f"Comparison of {title}", heads, rows)
+        return summarise(f"Comparison of {title}", heads, rows)
 
 
 def compare(

@@ -1,7 +1,7 @@
 """Allan curves of logs, arrays and tables, by channel."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,9 +11,9 @@ from imubench_pipeline import allan
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.estimators.rows import make_allan_rows
-from imubench_pipeline.library import given
+from imubench_pipeline.library import drawing, given
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.library.shown import Shown, ShownMapping, Summary
+from imubench_pipeline.library.shown import ByChannel, summarise
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.steps.allan import curve_of, report_too_sparse
@@ -32,7 +32,7 @@ _TABLE_COLUMNS = ("tau", "adev", "lower", "upper", "edf", "cluster_size", "avera
 
 
 @dataclass(frozen=True, repr=False)
-class Curve(Shown, AllanCurve):
+class Curve(AllanCurve):
     """An Allan curve with plots and tables.
 
     Attributes
@@ -43,35 +43,27 @@ class Curve(Shown, AllanCurve):
 
     channel: str | None = None
 
-    @classmethod
-    def of(cls, curve: AllanCurve, channel: str | None) -> "Curve":
-        """Return a curve with its channel."""
-        values = {field.name: getattr(curve, field.name) for field in fields(AllanCurve)}
-        return cls(**values, channel=channel)
-
     @property
     def quantity(self) -> str | None:
         """``gyro`` or ``accel``; None: not known."""
         return None if self.channel is None else quantity_of(self.channel)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
-        from imubench_pipeline.library.drawing import draw_curves, get_axes
-
-        axes: Axes = get_axes(ax)
-        draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
+        """Draw the deviation with 95 % limits."""
+        axes: Axes = drawing.get_axes(ax)
+        drawing.draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
         return axes
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each tau: deviation, 95 % limits, degrees of freedom; units in attrs."""
         return _make_table([self])
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         title = f"Allan curve{'' if self.channel is None else f' of {self.channel}'}"
-        return Summary(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
+        return summarise(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
 
 
-class Curves(ShownMapping[Curve]):
+class Curves(ByChannel[Curve]):
     """Allan curves by channel, in SI.
 
     Attributes
@@ -86,40 +78,33 @@ class Curves(ShownMapping[Curve]):
 
     def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""
-        from imubench_pipeline.library.drawing import create_panels, draw_curves
-
         by_quantity: dict[str, dict[str, AllanCurve]] = {}
         for channel, curve in self.items():
             by_quantity.setdefault(quantity_of(channel), {})[channel] = curve
-        axes = create_panels([*by_quantity], ax)
+        axes = drawing.create_panels([*by_quantity], ax)
         for panel, (quantity, curves) in zip(axes, by_quantity.items(), strict=True):
-            draw_curves(panel, curves, quantity)
+            drawing.draw_curves(panel, curves, quantity)
         return axes
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each channel and tau, like the workflow's table ``allan``, in SI."""
         return _make_table(self.values())
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         title = f"Allan curves{f' of {self.name}' if self.name else ''}"
-        return Summary(title, _SUMMARY_HEADS, [_make_row(curve) for curve in self.values()])
+        return summarise(title, _SUMMARY_HEADS, [_make_row(curve) for curve in self.values()])
 
 
 def measured(
     log: ChannelLog, sizes: ArrayLike | None, overlap: Overlap, threads: int
 ) -> Curve | None:
-    """Return the curve of a channel of a log at cluster sizes, shape (m,), or at the default ones.
-
-    None if too many samples are missing (`imubench_pipeline.steps.allan.report_too_sparse`).
-    """
+    """Return the curve at cluster sizes of shape (m,); None if too many samples are missing."""
     curve = curve_of(log, sizes, overlap, threads=threads)
-    return Curve.of(curve, log.channel) if len(curve.tau) else None
+    return Curve(**vars(curve), channel=log.channel) if len(curve.tau) else None
 
 
 def _make_row(curve: Curve) -> list[str]:
-    from imubench_pipeline.library.drawing import choose_deviation_unit
-
-    unit = choose_deviation_unit(curve.quantity)
+    unit = drawing.choose_deviation_unit(curve.quantity)
     lowest = int(np.argmin(curve.deviation))
     sign = "" if curve.quantity is None else f" {unit.sign}"
     return [
@@ -236,7 +221,7 @@ def allan_variance(
             segments=segments,
             threads=cores,
         )
-        return Curve.of(curve, channel)
+        return Curve(**vars(curve), channel=channel)
 
     if channels is None and units is None and not given.has_columns(data):
         samples = given.convert_to_numbers(data, "the array")

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.navigation.ratios import Ratio
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.palette import assign_sensor_styles
+from imubench_pipeline.report.palette import SUM_LOOK, TERM_LOOKS, TERM_NAMES, assign_sensor_styles
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.words.numbers import Unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from imubench_pipeline.navigation.ratios import Ratio
 
 _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
@@ -55,35 +56,12 @@ def choose_deviation_unit(quantity: str | None) -> Unit:
 
 
 def draw_curves(axes: "Axes", curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
-    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
+    """Draw Allan deviations with their 95 % limits."""
     unit = choose_deviation_unit(quantity)
     looks = cycle(assign_sensor_styles([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
     _format_axes(axes, unit)
-    # The slopes of white noise and of a random walk, through the ends of the first curve.
-    curve = next(iter(curves.values()))
-    level = curve.deviation * unit.per_si
-    limits = axes.get_xlim(), axes.get_ylim()
-    last = max(len(curve.up_to(1.0 / 9.0)) - 1, 0)
-    for place, slope, label in ((0, -0.5, "−1/2"), (last, 0.5, "+1/2")):
-        line = level[place] * (curve.tau / curve.tau[place]) ** slope
-        axes.plot(curve.tau, line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
-        inside = np.flatnonzero((line > limits[1][0]) & (line < limits[1][1]))
-        if len(inside):
-            at = inside[len(inside) * 3 // 4 if slope < 0.0 else len(inside) // 4]
-            axes.annotate(
-                label,
-                (curve.tau[at], line[at]),
-                xytext=(-3.0, -3.0),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                color="0.4",
-                fontsize="small",
-            )
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
 
 
 def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
@@ -95,8 +73,6 @@ def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour
 
 def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
     """Draw a measured curve, the terms of a model, and their sum."""
-    from imubench_pipeline.report.palette import SUM_LOOK, TERM_LOOKS, TERM_NAMES
-
     unit = choose_deviation_unit(quantity)
     draw_measured(axes, curve, unit, "log, 95 % limits", "black")
     for term in model.terms:
@@ -116,7 +92,7 @@ def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str
     _format_axes(axes, unit)
 
 
-def draw_ratios(axes: "Axes", labels: Sequence[str], ratios: Sequence[Ratio]) -> None:
+def draw_ratios(axes: "Axes", labels: Sequence[str], ratios: "Sequence[Ratio]") -> None:
     """Draw ratios with 95 % intervals in rows."""
     places = range(len(ratios), 0, -1)
     for place, ratio in zip(places, ratios, strict=True):

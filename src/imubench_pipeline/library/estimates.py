@@ -1,7 +1,7 @@
 """Noise parameters of logs, arrays and tables, estimated by the functions of the workflow."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -11,9 +11,10 @@ from imubench_pipeline.datasheets.suspicion import UsualFigures, usual_figures
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
+from imubench_pipeline.library.drawing import create_panels, draw_model, get_axes
 from imubench_pipeline.library.given import Channels, Units, read_columns, read_rate
 from imubench_pipeline.library.logs import Log, ingest_columns
-from imubench_pipeline.library.shown import Shown, ShownMapping, Summary, cut
+from imubench_pipeline.library.shown import ByChannel, cut, summarise
 from imubench_pipeline.model.recordings import DoubtRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import derive_doubts
@@ -41,7 +42,7 @@ _SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
 
 @dataclass(frozen=True, repr=False)
-class ChannelEstimate(Shown, Estimate):
+class ChannelEstimate(Estimate):
     """The noise parameters of one channel.
 
     Attributes
@@ -57,12 +58,6 @@ class ChannelEstimate(Shown, Estimate):
     measured: Curve | None = field(default=None, compare=False)
     log: str = "/"
 
-    @classmethod
-    def of(cls, estimate: Estimate, channel: str, measured: Curve, log: str) -> "ChannelEstimate":
-        """Return an estimate with its channel, curve and log."""
-        values = {each.name: getattr(estimate, each.name) for each in fields(Estimate)}
-        return cls(**values, channel=channel, measured=measured, log=log)
-
     @property
     def quantity(self) -> str:
         """``gyro`` or ``accel``."""
@@ -77,8 +72,6 @@ class ChannelEstimate(Shown, Estimate):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the measured curve with 95 % limits, the terms of the model, and their sum."""
-        from imubench_pipeline.library.drawing import draw_model, get_axes
-
         axes: Axes = get_axes(ax)
         assert self.measured is not None
         draw_model(axes, self.measured, self.model, self.quantity)
@@ -89,12 +82,12 @@ class ChannelEstimate(Shown, Estimate):
         """Return a row for each parameter: see `Estimates.to_pandas`."""
         return _make_table([self], units)
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         title = f"{self.channel} of {self.log}: {self.model.name}, by {self.method}"
-        return Summary(title, _SUMMARY_HEADS, list(_make_rows(self)), _list_reasons([self]))
+        return summarise(title, _SUMMARY_HEADS, list(_make_rows(self)), _list_reasons([self]))
 
 
-class Estimates(ShownMapping[ChannelEstimate]):
+class Estimates(ByChannel[ChannelEstimate]):
     """The noise parameters of a log, by channel.
 
     Attributes
@@ -160,8 +153,6 @@ class Estimates(ShownMapping[ChannelEstimate]):
 
     def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw curve and terms of each channel; return the axes, shape (channels,)."""
-        from imubench_pipeline.library.drawing import create_panels
-
         axes = create_panels([*self], ax)
         for panel, estimate in zip(axes, self.values(), strict=True):
             estimate.plot(panel)
@@ -189,7 +180,6 @@ class Estimates(ShownMapping[ChannelEstimate]):
         rate: float | None = None,
         inflation: float = 1.0,
         because: str | None = None,
-        latitude: float | None = None,
     ) -> str | bytes:
         """Return the input file of a filter or simulator, as `imubench export` writes it.
 
@@ -212,8 +202,6 @@ class Estimates(ShownMapping[ChannelEstimate]):
             Factor on every deviation, with its reason ``because``.
         because : str, optional
             Reason of the inflation, or of the use of an unfit log.
-        latitude : float, optional
-            For gravity, degrees.
 
         Raises
         ------
@@ -226,13 +214,12 @@ class Estimates(ShownMapping[ChannelEstimate]):
             "inflation": inflation,
             "because": because,
             "mode": mode,
-            "latitude": latitude,
             "rate": rate,
         }
         content: str | bytes = find_function("export_estimates")(self, target, path, options)
         return content
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         names = {estimate.model.name for estimate in self.values()}
         model = f": {names.pop()}" if len(names) == 1 else ""
         title = f"Estimates of {self.name}{model}, by {self.method}"
@@ -242,7 +229,7 @@ class Estimates(ShownMapping[ChannelEstimate]):
         serious = [f.finding for f in self.findings if f.severity != "note"]
         if serious:
             notes.append(f"warnings: {', '.join(dict.fromkeys(serious))} (see .findings)")
-        return Summary(title, _SUMMARY_HEADS, rows, notes)
+        return summarise(title, _SUMMARY_HEADS, rows, notes)
 
 
 def estimate(
@@ -338,7 +325,8 @@ def estimate(
             )
             left_out[channel] = next(reasons, "its clock has no readings of the temperature")
         else:
-            estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
+            values = {**vars(found), "channel": channel, "measured": curve, "log": log.name}
+            estimates.append(ChannelEstimate(**values))
     if not estimates:
         raise ValueError(
             f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"

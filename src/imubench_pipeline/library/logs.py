@@ -14,7 +14,7 @@ import numpy as np
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.library.given import Channels, Column, Units, expand_channels, get_dimension
-from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.library.shown import cut, summarise
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.readers.inspection.draft import Entry
 from imubench_pipeline.recordings import recording
@@ -48,7 +48,7 @@ _MAX_FINDINGS = 6  # max. number of findings in the summary
 _UNKNOWN_MODEL = {"vendor": "unknown", "model": "unknown"}
 
 
-class Log(Shown):
+class Log:
     """An ingested recording: its channels in SI on a uniform grid, and the findings.
 
     The samples are stored in a temporary folder, since a log may be larger than memory. The folder
@@ -193,7 +193,7 @@ class Log(Shown):
         }
         return table
 
-    def _summary(self) -> Summary:
+    def __repr__(self) -> str:
         rows = []
         for name, log in self._logs.items():
             rate, holes = f"{number_text(log.rate, 6)} Hz", "yes" if log.holes else "no"
@@ -207,7 +207,7 @@ class Log(Shown):
         heads = ["channel", "rate", "samples", "unit", "some missing"]
         made = " (simulated)" * self.simulated
         title = f"Log {self.name}{made}, {duration_text(self.duration)}"
-        return Summary(title, heads, rows, notes)
+        return summarise(title, heads, rows, notes)
 
 
 def read_log(
@@ -280,10 +280,7 @@ def read_log(
 
 
 def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples at a rate, Hz, as a log of this name, ingested like a file with all checks.
-
-    Raises RecordingError if no channel can be used.
-    """
+    """Return samples at a rate, Hz, as a log; raises RecordingError if no channel can be used."""
     if not name or Path(name).name != name:
         raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")
     channels, temperature = {}, None

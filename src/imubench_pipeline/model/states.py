@@ -3,7 +3,7 @@
 Tables keep the codes; `imubench_pipeline.words` has the words that people read.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 Severity = Literal["note", "warning", "fatal"]
 """Severity of a finding; after a fatal one, the channel or recording is not analysed."""
@@ -44,7 +44,7 @@ Verdict = Literal[
 
 A figure that is not known counts as the worst of its class. ``meets_if``: it fails so, and meets
 the limit on the conditions beside it; ``cannot_meet``: it fails even with the best of its class, by
-its data sheet. ``excluded``: it lacks a property that the requirement demands.
+its datasheet. ``excluded``: it lacks a property that the requirement demands.
 """
 
 SURE_PROBABILITY = 0.975
@@ -61,6 +61,8 @@ Action = Literal[
 
 Measured = Literal["gyro", "accel"]
 """Quantity that a sensor measures."""
+
+MEASURED: tuple[Measured, ...] = get_args(Measured)
 
 NoiseSource = Literal["Q", "N", "flicker", "GM", "K", "R", "line"]
 """Source of an error that is a term of the noise model (`Term.word`)."""

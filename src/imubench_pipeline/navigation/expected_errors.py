@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
 from types import MappingProxyType
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.model.states import Measured
+from imubench_pipeline.model.states import MEASURED, Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, uncertainty
 from imubench_pipeline.navigation.error_budget.budget import (
@@ -64,6 +63,8 @@ class AxisErrors:
         return AxisErrors(self.model)
 
 
+_TAIL = (1.0 - 0.95) / 2.0  # probability beyond each 95 % limit
+
 _NO_AXIS_ERRORS = AxisErrors()
 _NO_ERRORS = {"gyro": _NO_AXIS_ERRORS, "accel": _NO_AXIS_ERRORS}
 
@@ -86,12 +87,12 @@ class Question:
     @property
     def needs(self) -> tuple[Measured, ...]:
         """Quantities that are needed to compute it."""
-        return ("gyro",) if self.error in ("heading", "cross_track", "north") else _QUANTITIES
+        return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
     @property
     def uses(self) -> tuple[Measured, ...]:
         """Quantities that are used if they are recorded: accelerometers level a gyro for north."""
-        return _QUANTITIES if self.error == "north" else self.needs
+        return MEASURED if self.error == "north" else self.needs
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
@@ -152,17 +153,13 @@ class Question:
         )
 
 
-_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
 _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 
 
 def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield the standard questions, which are computed for every recording.
-
-    ``times`` and the static window are in s, the latitude for north in rad.
-    """
+    """Yield the standard questions; times and window in s, the latitude for north in rad."""
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
     for axis in axes:
@@ -230,7 +227,7 @@ def list_error_rows(
     axes = collect_axis_errors(estimates, figures)
     without = {
         quantity: AxisErrors(figures=figures.get(quantity, in_use.NO_FIGURES))
-        for quantity in _QUANTITIES
+        for quantity in MEASURED
     }
 
     drawn = {
@@ -258,9 +255,8 @@ def list_error_rows(
         nominal, noise, likely, best = question.answer_all(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        lower, upper = uncertainty.compute_interval(budgets)
-        # Draws of an absent term are above 0: extend the limits to the value.
-        lower, upper = min(lower, nominal.total), max(upper, nominal.total)
+        totals = [each.total for each in budgets]
+        lower, upper = uncertainty.compute_limits(totals, nominal.total, _TAIL)
         used = [channel for channel in chosen.values() if channel]
         apart = [channel for channel in used if estimates[channel].draws is None]
         reasons = (
@@ -403,7 +399,6 @@ def _find_reason(estimate: Estimate) -> str | None:
 
 _STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
 
 def list_growth_rows(
@@ -481,9 +476,7 @@ def list_growth_rows(
             sure = math.fsum(
                 part.sigma**2 for part in budget.contributions if not part.source.is_noise
             )
-            ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
-            # Draws of an absent term are above 0: extend the limits to the value.
-            lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
+            lower, upper = uncertainty.compute_limits(np.sqrt(drawn + sure), budget.total)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield row(**asdict(part.source), sigma=part.sigma)

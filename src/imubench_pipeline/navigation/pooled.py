@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeGuard, TypeVar
 
-from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
+from scipy.special import chdtrc, chdtri, stdtrit
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
@@ -274,10 +274,11 @@ def list_pooled_rows(
                 rows = table[""] | rows
             for device, present, count in _group_rows(sensor, rows, devices, several=several):
                 group = (sensor, device, channel, name)
-                yield _make_parameter_row(group, present, count - len(present), several)
+                of_devices = several and device is None
+                yield _make_parameter_row(group, present, count - len(present), of_devices)
         of_channel = means.get((sensor, channel), {})
         for device, biased, _ in _group_rows(sensor, of_channel, devices, several=several):
-            yield _make_bias_row((sensor, device, channel, "bias"), biased, several)
+            yield _make_bias_row((sensor, device, channel, "bias"), biased)
 
 
 def _group_rows(
@@ -286,34 +287,29 @@ def _group_rows(
     devices: Mapping[tuple[str, str], str],
     *,
     several: bool,
-) -> Iterator[tuple[str | None, list[tuple[str, E]], int]]:
-    """Yield device (None: all), rows with their devices, and number of recordings of each group."""
-    groups: dict[str | None, list[tuple[str, E | None]]] = {}
+) -> Iterator[tuple[str | None, list[E], int]]:
+    """Yield device (None: all), rows, and number of recordings of each group."""
+    groups: dict[str | None, list[E | None]] = {}
     for recording, entry in rows.items():
         device = devices.get((sensor, recording), recording)
         for group in (None, device) if several else (None,):
-            groups.setdefault(group, []).append((device, entry))
+            groups.setdefault(group, []).append(entry)
     for group, cells in groups.items():
-        present = [(device, entry) for device, entry in cells if entry is not None]
+        present = [entry for entry in cells if entry is not None]
         if len(cells) > 1 and present:
             yield group, present, len(cells)
 
 
 def _make_parameter_row(
-    group: _Group, present: Sequence[tuple[str, ParameterRow]], absent: int, several: bool
+    group: _Group, present: Sequence[ParameterRow], absent: int, of_devices: bool
 ) -> PooledRow:
-    of_devices = several and group[1] is None
-    triples = [
-        (row.value if row.status == "ok" else None, row.lower, row.upper) for _, row in present
-    ]
+    triples = [(row.value if row.status == "ok" else None, row.lower, row.upper) for row in present]
     pooled = pool(*zip(*triples, strict=True))
-    logs: list[tuple[float | None, str]] = []
-    left_out = Counter[str]()
-    for (of, row), triple in zip(present, triples, strict=True):
-        if is_usable(triple):
-            logs.append((math.log(triple[0]), of))
-        else:
-            left_out[texts.not_comparable(row.status)] += 1
+    left_out = Counter(
+        texts.not_comparable(row.status)
+        for row, triple in zip(present, triples, strict=True)
+        if not is_usable(triple)
+    )
     reasons = [texts.not_pooled(number, why) for why, number in left_out.items()]
     if pooled.contradicting:
         reasons.append(texts.contradicting_limits(pooled.contradicting))
@@ -325,7 +321,6 @@ def _make_parameter_row(
         reasons.append(texts.CLOSE_AGREEMENT)
     spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
     in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
-    reasons += _describe_device_effects(logs, of_devices)
     pooled = replace(
         pooled,
         left_out=pooled.left_out + absent,
@@ -334,7 +329,7 @@ def _make_parameter_row(
         spread_upper=in_unit[2],
         verdict=None if absent and pooled.verdict == "agree" else pooled.verdict,
     )
-    return _make_row(group, pooled, present[0][1].unit, reasons)
+    return _make_row(group, pooled, present[0].unit, reasons)
 
 
 def _make_row(group: _Group, pooled: Pool, unit: str, reasons: Iterable[str]) -> PooledRow:
@@ -342,34 +337,9 @@ def _make_row(group: _Group, pooled: Pool, unit: str, reasons: Iterable[str]) ->
     return PooledRow.taken_from(pooled, **names, unit=unit, reasons=tuple(reasons))
 
 
-def _make_bias_row(
-    group: _Group, present: Sequence[tuple[str, FixedBiasRow]], several: bool
-) -> PooledRow:
-    pairs = [(row.value, of) for of, row in present]
-    bias = estimate_turn_on_bias(value for value, _ in pairs)
+def _make_bias_row(group: _Group, present: Sequence[FixedBiasRow]) -> PooledRow:
+    bias = estimate_turn_on_bias(row.value for row in present)
     reasons = [texts.not_pooled(bias.left_out, texts.WITHOUT_MEAN)] * (bias.left_out > 0)
     if quantity_of(group[2]) == "accel":
         reasons.append(texts.GRAVITY_IN_MEAN)
-    reasons += _describe_device_effects(pairs, several and group[1] is None)
-    return _make_row(group, bias, present[0][1].unit, reasons)
-
-
-def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
-    """Return how the spread between devices compares with repeats, if it can be tested."""
-    # One-way analysis of variance (Fisher 1925), with equal weights of the recordings.
-    groups: dict[str, list[float]] = {}
-    for value, device in pairs:
-        if value is not None and math.isfinite(value):
-            groups.setdefault(device, []).append(value)
-    values = [value for group in groups.values() for value in group]
-    between, within = len(groups) - 1, len(values) - len(groups)
-    if not several or between < 1 or within < 1:
-        return []
-    grand = math.fsum(values) / len(values)
-    means = [(math.fsum(group) / len(group), group) for group in groups.values()]
-    apart = math.fsum(len(group) * (mean - grand) ** 2 for mean, group in means)
-    inside = math.fsum((y - mean) ** 2 for mean, group in means for y in group)
-    if not inside:
-        return []
-    p_value = float(fdtrc(between, within, apart * within / between / inside))
-    return [texts.devices_compared(p_value, differ=p_value < SIGNIFICANCE_LEVEL)]
+    return _make_row(group, bias, present[0].unit, reasons)

@@ -24,7 +24,7 @@ from imubench_pipeline.model.estimates import DrawnDeviationRow
 from imubench_pipeline.model.states import RatioVerdict
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.model import sum_over_terms
+from imubench_pipeline.noise.model import stack_models, sum_over_stacked_terms
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import pools as texts
@@ -235,8 +235,9 @@ def _draw_variances(channel: ComparedChannel, draws: int, seed: int, tau: Sequen
     """Return the Allan variances of drawn noise models of a channel, shape (tau, draws)."""
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
     times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
-    return sum_over_terms(
-        channel.drawn(draws, stream), lambda term: term.allan_variance(times), len(tau)
+    models = channel.drawn(draws, stream)
+    return sum_over_stacked_terms(
+        len(models), stack_models(models), lambda term: term.allan_variance(times), len(tau)
     )
 
 

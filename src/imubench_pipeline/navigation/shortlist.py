@@ -13,7 +13,7 @@ from imubench_pipeline.datasheets.class_limits import find_limit
 from imubench_pipeline.datasheets.printed_noise import WALK_TIMES, PrintedNoise, read_printed_noise
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.model.states import Measured, Verdict
+from imubench_pipeline.model.states import MEASURED, Measured, Verdict
 from imubench_pipeline.model.verdicts import Share, Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import read_figures
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -37,7 +37,6 @@ from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import budgets as texts
 from imubench_pipeline.words.verdicts import class_limit_text, worse_than_class_text
 
-_QUANTITIES: tuple[Measured, ...] = ("gyro", "accel")
 _MIN_SHARE = 0.01  # of the variance
 _MIN_EXCESS = 1.001  # of a printed figure over the worst of the class, which is rounded
 
@@ -52,9 +51,9 @@ class _PrintedErrors:
 
 
 def _read_printed_errors(sensor: Sensor) -> _PrintedErrors:
-    noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if getattr(sensor.datasheet, q)}
+    noise = {q: read_printed_noise(sensor, q) for q in MEASURED if getattr(sensor.datasheet, q)}
     axes, remarks = {}, []
-    for q in _QUANTITIES:
+    for q in MEASURED:
         models = noise[q].models if q in noise else dict.fromkeys(WALK_TIMES, NoiseModel())
         figures = read_figures(sensor, q)
         axes[q] = AxisErrors(models["in_use"], figures, models["likely"], models["best"])
@@ -130,7 +129,7 @@ def _judge_by_datasheet(
     )
     # The sensor has all axes of its quantities, logged or not.
     has = read_abilities(sensor)
-    channels = tuple(f"{q}_{axis}" for q in _QUANTITIES if q not in has.without for axis in "xyz")
+    channels = tuple(f"{q}_{axis}" for q in MEASURED if q not in has.without for axis in "xyz")
     has = has.model_copy(update={"channels": channels, "logged_rate": None})
     lacking, unknown = judge(requirement, has)
     if not requirement.admits(sensor.price_class):
@@ -138,7 +137,6 @@ def _judge_by_datasheet(
         lacking.append(Shortfall("price_class", sensor.price_class or "", asked))
     if any(quantity in has.without for quantity in requirement.quantities):
         return replace(row, verdict="excluded", shortfalls=tuple(lacking))
-    noise = printed.noise
     answers = [
         (question, *question.answer_all(printed.axes["gyro"], printed.axes["accel"]))
         for question in questions
@@ -166,6 +164,7 @@ def _judge_by_datasheet(
         for source, size in figures.items()
     )
     helps = all(figures and min(figures.values()) > 0.0 for figures in by_limit)
+    shares = list(_list_shares(budget, printed.noise))
     conditions = tuple(unknown)
     worst_best = min(each[3] for each in margins)
     verdict: Verdict = "meets"
@@ -188,8 +187,14 @@ def _judge_by_datasheet(
         decides=requirement.by_dead_reckoning[place].text,
         verdict=verdict,
         conditions=conditions if verdict != "excluded" else (),
-        parts=tuple(_list_shares(budget, noise)),
-        assumed=tuple(dict.fromkeys(_list_assumed(budget, noise))),
+        parts=tuple(share for share, _ in shares),
+        assumed=tuple(
+            dict.fromkeys(
+                class_limit_text(share.quantity, share.source, sigma)
+                for share, sigma in shares
+                if share.origin == "class limit" and share.quantity
+            )
+        ),
         shortfalls=tuple(lacking),
         reasons=(
             *((texts.NOISE_NOT_PRINTED,) if verdict == "not_enough_data" else ()),
@@ -198,8 +203,10 @@ def _judge_by_datasheet(
     )
 
 
-def _list_shares(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iterator[Share]:
-    """Yield the sources with a relevant share of the variance, the largest first."""
+def _list_shares(
+    budget: Budget, noise: Mapping[Measured, PrintedNoise]
+) -> Iterator[tuple[Share, float | None]]:
+    """Yield the sources with a relevant share, the largest first, with the figures of others."""
     for part in sorted(budget.contributions, key=lambda part: -part.sigma):
         share = (part.sigma / budget.total) ** 2 if budget.total else 0.0
         if share >= _MIN_SHARE:
@@ -209,15 +216,5 @@ def _list_shares(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iter
             else:
                 assumed = source.quantity and source.source in noise[source.quantity].assumed
                 origin = "class limit" if assumed else "datasheet"
-            yield Share(**asdict(source), share=share, origin=origin)
-
-
-def _list_assumed(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iterator[str]:
-    """Yield the sources that count with a limit of their class, in words."""
-    figures = {
-        (part.source.quantity, part.source.source): part.figure for part in budget.contributions
-    }
-    for share in _list_shares(budget, noise):
-        if share.origin == "class limit" and share.quantity:
-            figure = figures[share.quantity, share.source]
-            yield class_limit_text(share.quantity, share.source, figure.sigma if figure else None)
+            sigma = part.figure.sigma if part.figure else None
+            yield Share(**asdict(source), share=share, origin=origin), sigma

@@ -8,11 +8,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
+import numpy as np
 from pydantic import Field
 
 from imubench_pipeline.datasheets.class_limits import count_sensors_within
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.model.states import Cause, Measured, SourceCode, Verdict
+from imubench_pipeline.model.states import MEASURED, Cause, Measured, SourceCode, Verdict
 from imubench_pipeline.model.verdicts import Condition, Property, Share, Shortfall
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Requirement
@@ -43,11 +44,10 @@ class Abilities(Strict):
 
 def read_abilities(sensor: Sensor) -> Abilities:
     """Return the properties of a sensor from its file."""
-    quantities: tuple[Measured, ...] = ("gyro", "accel")
     printed = {
         name: {
             quantity: largest
-            for quantity in quantities
+            for quantity in MEASURED
             if (largest := _find_largest(sensor.datasheet, quantity, name)) is not None
         }
         for name in ("full_scale", "bandwidth")
@@ -64,9 +64,7 @@ def read_abilities(sensor: Sensor) -> Abilities:
             else None
         ),
         channels=tuple(sensor.log.channels),
-        without=tuple(
-            quantity for quantity in quantities if getattr(sensor.datasheet, quantity) is None
-        ),
+        without=tuple(each for each in MEASURED if getattr(sensor.datasheet, each) is None),
         mass=_convert_to_si(sensor.mass, "mass"),
         power=_convert_to_si(sensor.power, "power"),
     )
@@ -86,12 +84,10 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     ]
     by_axis = []
     for axis in "xyz":
-        printed = [(figure, figure.on_axis(axis)) for figure in figures]
         values = [
             convert_to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
-            for figure, value in printed
-            if value is not None
-            for size in (value if isinstance(value, tuple) else (value,))
+            for figure in figures
+            for size in np.ravel(figure.on_axis(axis) or ()).tolist()
         ]
         if not values:
             return None
@@ -124,7 +120,7 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[tuple[bool | 
             # The sensor may have axes that are not in its logs.
             logged = f"{quantity}_{axis}" in has.channels or None
             yield logged, Shortfall("axis", f"{quantity}_{axis}", text)
-    for measured in get_args(Measured):
+    for measured in MEASURED:
         text = getattr(must.full_scale, measured)
         if text is None:
             continue
@@ -139,7 +135,7 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[tuple[bool | 
         # Of the quantities with required axes, or else of all.
         asked = {axes.split("_")[0] for axes in must.axes} or set(requirement.quantities)
         lowest = parse_quantity(must.bandwidth, "frequency")
-        for measured in get_args(Measured):
+        for measured in MEASURED:
             if measured in asked and measured not in has.without:
                 width = has.bandwidth.get(measured)
                 wide = None if width is None else width >= lowest
@@ -189,11 +185,7 @@ class Conditions:
     def of(
         cls, requirement: Requirement, has: Abilities, conditions: Iterable[ErrorBudgetRow]
     ) -> "Conditions":
-        """Return the conditions of the verdict on a sensor.
-
-        ``has`` are the properties of the sensor; ``conditions`` the rows of the table
-        ``error_budget`` whose class limits are too large.
-        """
+        """Return the conditions; ``conditions``: budget rows with too large class limits."""
         lacking, unknown = judge(requirement, has)
         largest = merge_largest((row.quantity, row.source, row.largest) for row in conditions)
         return cls(tuple(lacking), tuple(unknown), largest)

@@ -24,14 +24,10 @@ class Calibrated:
     The mean of a gyro is its bias plus the Earth's rate, and the mean of an accelerometer its bias
     plus gravity times the tilt; both are removed. The sensor is assumed to have been on for some
     time. The error is 4 % smaller if flicker noise starts with a window as long as the motion, and
-    0.3 % smaller if it starts this time earlier. Raises ValueError if W is not above 0.
+    0.3 % smaller if it starts this time earlier.
     """
 
     window: float  # W, s
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.window) and self.window > 0):
-            raise ValueError(f"window is {self.window}, expected a time above 0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,18 +35,11 @@ class Uncalibrated:
     """The bias of a sensor is not estimated: turn-on bias and the noise since switch-on remain.
 
     Flicker noise, random walk and ramp are 0 at switch-on. Gauss-Markov processes are stationary.
-    Raises ValueError if a figure is negative or not finite.
     """
 
     bias: float | None
     """Turn-on bias, 1 sigma, rad/s or m/s^2; None: from the data of the sensor (`in_use`)."""
     on_time: float  # time from switch-on to the start, s
-
-    def __post_init__(self) -> None:
-        for name in ("bias", "on_time"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
 
 
 SensorStart = Calibrated | Uncalibrated
@@ -71,8 +60,3 @@ def of_white_mean(order: int, time: float, start: SensorStart) -> float:
     if isinstance(start, Uncalibrated):
         return 0.0
     return of_constant(order, time) ** 2 / start.window
-
-
-def of_walk(order: int, time: float) -> float:
-    """Return t^(2m+3) / ((2m+3) (m+1)!^2), the variance for a random walk with K = 1 from 0."""
-    return of_white(order + 1, time)

@@ -180,24 +180,18 @@ def stack_models(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp
         yield np.array([number for number, _ in members]), kind(*values)
 
 
-def sum_over_terms(
-    models: Sequence[NoiseModel], figure: Callable[[Term], Array], places: int | None = None
-) -> Array:
-    """Return a quantity of each model that is the sum over its terms, such as a variance.
-
-    ``figure`` returns an array of shape (k,), or (places, k), for a term with array parameters of
-    shape (k,). The result has the shape (models,), or (places, models).
-    """
-    return sum_over_stacked_terms(len(models), stack_models(models), figure, places)
-
-
 def sum_over_stacked_terms(
     number: int,
     stacked: Iterable[tuple[NDArray[np.intp], Term]],
     figure: Callable[[Term], Array],
     places: int | None = None,
 ) -> Array:
-    """Return the same for ``number`` models that are already stacked (see `stack_models`)."""
+    """Return a quantity of ``number`` models that is the sum over their terms, such as a variance.
+
+    ``stacked`` is from `stack_models`; ``figure`` returns an array of shape (k,), or (places, k),
+    for a term with array parameters of shape (k,). The result has the shape (number,), or (places,
+    number).
+    """
     total = np.zeros((number,) if places is None else (places, number))
     for numbers, term in stacked:
         total[..., numbers] += figure(term)

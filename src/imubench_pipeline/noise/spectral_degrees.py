@@ -7,7 +7,6 @@ r_k^2 over all pairs. Ramps and lines contribute by their products with the nois
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +29,6 @@ _ROUNDING_COVARIANCE = ((0, 6.0), (1, -4.0), (2, 1.0))
 over the variance of a rounding error."""
 
 
-@dataclass(frozen=True)
-class Degrees:
-    """Degrees of freedom of an Allan variance over tau."""
-
-    edf: Array  # (m,): chi-squared variate with the same relative variance
-    upper: Array  # (m,): chi-squared variate with the same lower tail, for the upper limit
-
-
 def compute_degrees_of_freedom(
     model: NoiseModel,
     rate: float,
@@ -46,8 +37,11 @@ def compute_degrees_of_freedom(
     segments: Sequence[Span] | None = None,
     presence: Presence | None = None,
     share: Array | None = None,
-) -> Degrees:
+) -> tuple[Array, Array]:
     """Return the degrees of freedom of the Allan variances of a Gaussian log of a noise model.
+
+    They are for the chi-squared variate with the same relative variance, and for the one with the
+    same lower tail, which gives the upper limit; both of shape (m,).
 
     ``sizes``, shape (m,), are n of each tau; no difference spans two segments. If samples are
     missing, ``presence`` says which, and ``share``, shape (m,), is the share of the differences
@@ -62,7 +56,7 @@ def compute_degrees_of_freedom(
         for n, part in zip(sizes, left, strict=True)
     ]
     edf, upper = (np.array(column, dtype=np.float64) for column in zip(*pairs, strict=True))
-    return Degrees(edf, upper)
+    return edf, upper
 
 
 def _find_degrees(

@@ -82,10 +82,7 @@ def _build_block_diagonal(parts: Sequence[Array]) -> Array:
 
 
 def factor_covariance(covariance: Array) -> Array:
-    """Return the lower triangular root of a covariance, shape (m, m).
-
-    Components without variance have rows of zeros.
-    """
+    """Return the lower triangular root of a covariance (m, m); rows of zeros without variance."""
     if len(covariance) == 1:  # frequent: most terms, for each log of an ensemble
         return np.sqrt(covariance)
     varying = np.flatnonzero(np.diag(covariance))

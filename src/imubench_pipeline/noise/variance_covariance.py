@@ -5,11 +5,11 @@ log their covariance follows from the spectrum of the samples.
 """
 
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.typing import Array
 
 _STRATA_PER_DECADE = 640
@@ -25,15 +25,8 @@ and Gauss-Markov processes of any T_B give 1.2 to 1.7.
 """
 
 
-class Spectrum(Protocol):
-    """A model with a spectrum of the samples of a log."""
-
-    def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
-        """Return the spectrum at angular frequencies in rad per sample, SI^2."""
-
-
 def compute_variance_covariance(
-    model: Spectrum, rate: float, samples: int, sizes: NDArray[np.int64]
+    model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64]
 ) -> Array:
     """Return the covariance of the Allan variance estimates of a Gaussian log.
 

@@ -17,7 +17,7 @@ from imubench_pipeline.words.verdicts import VERDICT_WORDS
 _FILE = Path(__file__).with_name("glossary.yaml")
 
 _NAMES: Mapping[str, str] = {
-    **STATUS_WORDS,
+    **dict(STATUS_WORDS.items()),
     **{f"verdict_{code}": words for code, words in VERDICT_WORDS.items()},
     "verdict_meets_if": f"{VERDICT_WORDS['meets']} if …",
 }

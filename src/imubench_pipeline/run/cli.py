@@ -185,8 +185,7 @@ def _inspect(options: argparse.Namespace) -> int:
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
     output: outputs.OutputFile | None = options.output
-    model = output.path.stem if output is not None else None
-    inspected = inspect_log(options.log, model=model)
+    inspected = inspect_log(options.log, model=output.path.stem if output is not None else None)
     if output is not None:
         output.write(inspected.block)
     if not options.block:

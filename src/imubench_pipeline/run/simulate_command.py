@@ -308,10 +308,11 @@ def _list_short_files(
     from imubench_pipeline.simulate.profiles import FileColumn
 
     profiles = [*motion.values(), *([] if temperature is None else [temperature])]
-    series = dict.fromkeys(
-        profile.series for profile in profiles if isinstance(profile, FileColumn)
-    )
-    spans = {file.path: file.span() for file in series}
+    spans = {
+        profile.path: (profile.times[0], profile.times[-1])
+        for profile in profiles
+        if isinstance(profile, FileColumn)
+    }
     return [
         f"{path} is from {first:g} to {last:g} s: its ends are held before and after"
         for path, (first, last) in spans.items()

@@ -124,13 +124,16 @@ _change = make_validator(
 )
 
 
+_BIAS = "a standard deviation from 0, with its unit"
+
+
 class TurnOn(Strict):
     """Standard deviations of the biases with which dead reckoning begins."""
 
-    gyro: Annotated[Text, make_validator("angular_rate")] | None = Field(
+    gyro: Annotated[Text, make_validator("angular_rate", _BIAS, from_zero=True)] | None = Field(
         None, description="with its unit, such as 0.2 deg/s; null: from the datasheet"
     )
-    accel: Annotated[Text, make_validator("acceleration")] | None = Field(
+    accel: Annotated[Text, make_validator("acceleration", _BIAS, from_zero=True)] | None = Field(
         None, description="with its unit, such as 20 mg; null: from the datasheet"
     )
     on_time: Time = Field("60 s", description="since the sensor was switched on")

@@ -21,14 +21,16 @@ from imubench_pipeline.settings.experiments import (
 )
 from imubench_pipeline.settings.printed import Kind as FigureKind
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
-from imubench_pipeline.settings.sensor import Channel, ColumnSource, LogFormat, Sensor, TimeSource
-from imubench_pipeline.settings.simulated_sensor import (
-    AxisSettings,
-    Figures,
-    ImuSettings,
-    check_axes,
-    parse_figure,
+from imubench_pipeline.settings.sensor import (
+    QUANTITIES,
+    Channel,
+    ColumnSource,
+    LogFormat,
+    Sensor,
+    TimeSource,
+    quantity_of,
 )
+from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings, check_axes
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,
@@ -57,18 +59,26 @@ class PublishedFigure(Strict):
     means: Text = Field(description="the same as that parameter: N two-sided, B the floor / 0.664")
     why: Text | None = Field(None, description="reason for the difference from an estimate")
 
-    def si(self, channel: str) -> float:
+    def si(self, quantity: str) -> float:
         """Return its meaning in SI."""
-        return parse_figure(self.means, self.parameter, channel)
+        dimensions = {
+            "N": f"{quantity}_density",
+            "sensitivity": f"{quantity}_temperature_coefficient",
+        }
+        return parse_quantity(self.means, dimensions.get(self.parameter, QUANTITIES[quantity]))
 
 
-class ReadByAuthors(Figures):
+class ReadByAuthors(Strict):
     """Values that a source read from the curve of its own, unpublished log."""
 
     N: Text | None = Field(None, description="white noise density, two-sided")
     B: Text | None = Field(None, description="bias instability: the floor of the curve / 0.664")
     T_B: Text | None = Field(None, description="correlation time")
     K: Text | None = Field(None, description="rate or acceleration random walk")
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the stated figures in SI."""
+        return AxisSettings(**self.model_dump()).si(channel)
 
 
 class SimulatedChannel(AxisSettings):
@@ -89,7 +99,7 @@ class SimulatedChannel(AxisSettings):
                 self.read.si(channel)
         for number, figure in enumerate(self.published):
             with add_key_to_errors(f"published.{number}.means: "):
-                figure.si(channel)
+                figure.si(quantity_of(channel))
 
     @model_validator(mode="after")
     def _known(self) -> Self:

@@ -11,7 +11,7 @@ Nothing is computed here: every configuration loads this module.
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -19,58 +19,51 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
 from imubench_pipeline.settings.validation import Frequency, Strict, Text
 from imubench_pipeline.units import UnitError, add_key_to_errors, parse_difference, parse_quantity
 
-_DIMENSIONS = dict.fromkeys(("B", "amplitude", "bias", "resolution", "full_scale"), "{signal}") | {
-    "N": "{quantity}_density",
-    "T_B": "time",
-    "K": "{quantity}_random_walk",
-    "R": "{quantity}_ramp",
-    "Q": "{quantity}_quantization",
-    "frequency": "frequency",
-    "sensitivity": "{quantity}_temperature_coefficient",
-    "reference": "temperature",
-    "quadratic": "{quantity}_temperature_curvature",
-    "lag": "time",
-}
 
+class _Figures(Strict):
+    """Figures with units; ``{}`` in a dimension is the quantity, ``signal`` its own dimension."""
 
-def parse_figure(text: str, name: str, channel: str) -> float:
-    """Return a figure of a channel, or of all channels of a quantity, in SI."""
-    quantity = quantity_of(channel)
-    return parse_quantity(
-        text, _DIMENSIONS[name].format(quantity=quantity, signal=QUANTITIES[quantity])
-    )
-
-
-class Figures(Strict):
-    """Figures with their units."""
+    dimensions: ClassVar[Mapping[str, str]]
 
     def si(self, channel: str) -> dict[str, float]:
-        """Return the stated figures of a channel, or of its quantity, in SI; reference in degC."""
-        in_si = {}
-        for name, text in self:
-            if name in _DIMENSIONS and text is not None:
-                with add_key_to_errors(f"{name}: "):
-                    in_si[name] = parse_figure(text, name, channel)
-        return in_si
+        """Return the stated figures in SI, temperatures in degC; UnitError begins with the key.
+
+        ``channel``: a channel, or its quantity.
+        """
+        quantity, figures = quantity_of(channel), {}
+        for key, of in self.dimensions.items():
+            if (text := getattr(self, key)) is not None:
+                dimension = QUANTITIES[quantity] if of == "signal" else of.format(quantity)
+                with add_key_to_errors(f"{key}: "):
+                    figures[key] = parse_quantity(text, dimension)
+        return figures
 
 
-class ProcessSettings(Figures):
+class ProcessSettings(_Figures):
     """A Gauss-Markov process."""
 
+    dimensions: ClassVar = {"B": "signal", "T_B": "time"}
     B: Text
     T_B: Text
 
 
-class LineSettings(Figures):
+class LineSettings(_Figures):
     """A sinusoid."""
 
+    dimensions: ClassVar = {"amplitude": "signal", "frequency": "frequency"}
     amplitude: Text
     frequency: Frequency
 
 
-class DriftSettings(Figures):
+class DriftSettings(_Figures):
     """The drift with temperature."""
 
+    dimensions: ClassVar = {
+        "sensitivity": "{}_temperature_coefficient",
+        "reference": "temperature",
+        "quadratic": "{}_temperature_curvature",
+        "lag": "time",
+    }
     sensitivity: Text
     reference: Text = "25 degC"
     quadratic: Text | None = None
@@ -84,9 +77,18 @@ class LowPassSettings(Strict):
     order: int = Field(1, ge=1, le=10, description="above 1: Butterworth")
 
 
-class AxisSettings(Figures):
+class AxisSettings(_Figures):
     """One axis: its noise (N is two-sided, before the low-pass), and its other errors."""
 
+    dimensions: ClassVar = {
+        "N": "{}_density",
+        "B": "signal",
+        "T_B": "time",
+        "K": "{}_random_walk",
+        "R": "{}_ramp",
+        "Q": "{}_quantization",
+        **dict.fromkeys(("bias", "resolution", "full_scale"), "signal"),
+    }
     N: Text | None = Field(None, description="white noise density, two-sided")
     B: Text | None = Field(
         None, description="bias instability (the curve's peak is 0.664 B); without T_B: flicker"
@@ -112,14 +114,16 @@ class AxisSettings(Figures):
 
     def check(self, channel: str) -> None:
         """Raise UnitError, with the key, if a unit has the wrong dimension for its figure."""
-        parts: dict[str, Figures] = {"": self}
-        parts |= {f"further.{number}.": one for number, one in enumerate(self.further)}
-        parts |= {f"sinusoids.{number}.": one for number, one in enumerate(self.sinusoids)}
+        self.si(channel)
+        for number, process in enumerate(self.further):
+            with add_key_to_errors(f"further.{number}."):
+                process.si(channel)
+        for number, line in enumerate(self.sinusoids):
+            with add_key_to_errors(f"sinusoids.{number}."):
+                line.si(channel)
         if self.drift is not None:
-            parts["drift."] = self.drift
-        for key, part in parts.items():
-            with add_key_to_errors(key):
-                part.si(channel)
+            with add_key_to_errors("drift."):
+                self.drift.si(channel)
 
 
 def _matrix(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:

@@ -43,11 +43,6 @@ class SlowSources:
     residual: Array
 
 
-def compute_filter_transition(low_pass: LowPass, interval: float) -> Array:
-    """Return the transition matrix of a filter over an interval, s: e^(F interval), (m, m)."""
-    return np.asarray(expm(low_pass.transition * interval))
-
-
 def discretise_slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
     """Discretise Gauss-Markov processes and random walks, and the filter that they drive.
 

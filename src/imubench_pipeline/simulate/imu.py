@@ -96,7 +96,7 @@ def simulate_imu(
     with ThreadPoolExecutor(max(1, threads)) as pool:
         for start in range(0, samples, SAMPLES_PER_BLOCK):
             times = np.arange(start, min(start + SAMPLES_PER_BLOCK, samples)) / rate
-            present = {name: profile.at(times) for name, profile in profiles.items()}
+            present = {name: profile(times) for name, profile in profiles.items()}
             blocks = dict(zip(streams, pool.map(next, streams.values()), strict=True))
             if temperature is not None:
                 block, step = present[TEMPERATURE], imu.temperature_step

@@ -9,22 +9,22 @@ flicker noise, random walk, ramp, lines, bias, drift and motion. Quantization no
 the filter: it is the error -dq/dt, over a sampling interval, of a converter that counts increments
 of angle or velocity. It differs from the rounding to the resolution (LSB) of a rate register, which
 is simulated as rounding to the nearest step. With noise of at least half a step, rounding adds
-LSB^2 / 12 to the variance of each sample; spectrum and Allan variance use this value. A sensor
-seldom has both: an estimate of N from a rounded log already contains the rounding (`in_the_log`).
+LSB^2 / 12 to the variance of each sample; the spectrum uses this value. A sensor seldom has both:
+an estimate of N from a rounded log already contains the rounding (`in_the_log`).
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import expm
 from scipy.optimize import nnls
 
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, Term, compute_bias_instability
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, compute_bias_instability
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.noise.terms.base import drives_of
+from imubench_pipeline.noise.terms.base import Drives, drives_of
 from imubench_pipeline.simulate import discretisation
 from imubench_pipeline.typing import Array
 
@@ -36,51 +36,33 @@ interval, whichever is shorter."""
 _MAX_TIME_RATIO = 1e5  # longest correlation time of flicker noise, over the longest requested time
 
 
-@dataclass(frozen=True)
-class Sources:
-    """Noise at the input of a filter; spectrum and Allan variance after it have closed forms.
-
-    Both follow from the exact discrete state space of the process and its filter. Flicker noise is
-    a sum of Gauss-Markov processes, truncated at correlation times of negligible contribution.
-    """
-
-    white: float  # N^2
-    flicker: float  # B^2 of flicker noise
-    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
-    # processes; an infinite time: a random walk
-    times: Array
-    densities: Array
-
-    def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities, (n,), with the processes that approximate flicker noise.
-
-        The sampling interval and the longest requested time are in s.
-        """
-        if self.flicker == 0.0:
-            return self.times, self.densities
-        # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
-        shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
-        longest *= _MAX_TIME_RATIO
-        count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
-        times = np.geomspace(shortest, longest, count)
-        variance = math.log(times[1] / times[0]) / math.pi
-        densities = self.flicker * 2.0 * variance / times
-        return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
+def _realise(
+    drives: Drives, low_pass: LowPass, interval: float, longest: float
+) -> tuple[Array, Array]:
+    """Return times and densities, (n,), with flicker noise as processes; arguments in s."""
+    if drives.flicker == 0.0:
+        return drives.times, drives.densities
+    # Log-spaced processes, five per decade, sum to flicker noise with a ripple below 1e-8.
+    shortest = _MIN_TIME_RATIO * min(1.0 / low_pass.angular_cutoff, interval)
+    longest *= _MAX_TIME_RATIO
+    count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
+    times = np.geomspace(shortest, longest, count)
+    variance = math.log(times[1] / times[0]) / math.pi
+    densities = drives.flicker * 2.0 * variance / times
+    return np.concatenate([drives.times, times]), np.concatenate([drives.densities, densities])
 
 
-def compute_sampled_spectrum(
-    sources: Sources, low_pass: LowPass, omega: Array, rate: float
-) -> Array:
-    """Return the spectrum of the samples, SI^2, in the shape of omega, rad/sample, not 0.
+def compute_sampled_spectrum(drives: Drives, low_pass: LowPass, omega: Array, rate: float) -> Array:
+    """Return the spectrum of samples at a rate, Hz, SI^2, in the shape of omega, rad/sample.
 
-    The rate is in Hz.
+    It follows from the exact discrete state space of each process and the filter.
     """
     interval = 1.0 / rate
     flat = np.ravel(omega)
     lowest = float(np.abs(flat).min(initial=math.pi))
-    times, densities = sources.realised(low_pass, interval, interval / lowest)
+    times, densities = _realise(drives, low_pass, interval, interval / lowest)
     slow = discretisation.discretise_slow_sources(times, interval, low_pass)
-    transition = discretisation.compute_filter_transition(low_pass, interval)
+    transition = np.asarray(expm(low_pass.transition * interval))
     white = discretisation.compute_white_factor(low_pass, interval)
     spectrum = np.empty_like(flat)
     for begin in range(0, len(flat), _FREQUENCIES_PER_CHUNK):
@@ -91,7 +73,7 @@ def compute_sampled_spectrum(
             (turn - transition).swapaxes(1, 2),
             np.broadcast_to(low_pass.output[:, None], (len(w), low_pass.order, 1)).astype(complex),
         )[..., 0]
-        power = sources.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
+        power = drives.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
         if len(times):
             # z - e^(-interval/T), without cancellation where both are close to 1
             gap = (-2.0 * np.sin(w / 2.0) ** 2 + 1j * np.sin(w))[:, None] + slow.lost
@@ -101,112 +83,6 @@ def compute_sampled_spectrum(
             power += (first + rest) @ densities
         spectrum[begin : begin + _FREQUENCIES_PER_CHUNK] = power
     return spectrum.reshape(np.shape(omega))
-
-
-def compute_allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
-    """Return the Allan variance of the samples, SI^2, in the shape of n, samples per cluster.
-
-    The difference of the sums over two adjacent clusters is a linear function of the state before
-    them and of the noise in them. Both contributions are computed by doubling, as sums of positive
-    terms, at a cost proportional to log n. The rate is in Hz.
-    """
-    interval = 1.0 / rate
-    sizes = np.ravel(n).astype(np.int64)
-    longest = interval * int(sizes.max(initial=1))
-    times, densities = sources.realised(low_pass, interval, longest)
-    sample, start = _make_one_sample(sources.white, times, densities, low_pass, interval)
-    powers = [sample]
-    for _ in range(int(sizes.max(initial=1)).bit_length() - 1):
-        powers.append(powers[-1].then(powers[-1]))
-    variance = np.empty(len(sizes))
-    for i, size in enumerate(sizes):
-        chosen = [powers[bit] for bit in range(int(size).bit_length()) if size >> bit & 1]
-        cluster = chosen[0]
-        for part in chosen[1:]:
-            cluster = cluster.then(part)
-        variance[i] = cluster.difference(start) / (2.0 * float(size) ** 2)
-    return variance.reshape(np.shape(n))
-
-
-@dataclass(frozen=True)
-class _Cluster:
-    """State transition and sum of consecutive samples of independent systems z = (x, e)."""
-
-    # shape (n, k, k); transition of the state over the samples, and identity minus transition
-    transition: Array
-    lost: Array
-    sums: Array  # shape (n, k); gain from the state before the samples to their sum
-    # state, both, total: shapes (n, k, k), (n, k), (n,); covariance of the noise contributions to
-    # the state after the samples and to their sum: state, state with sum, sum
-    state: Array
-    both: Array
-    total: Array
-
-    def then(self, later: "_Cluster") -> "_Cluster":
-        """Return the concatenation of this cluster and the next one."""
-        after = later.transition
-        carried = np.einsum("nij,nj->ni", self.state, later.sums)
-        return _Cluster(
-            after @ self.transition,
-            self.lost + self.transition @ later.lost,
-            self.sums + np.einsum("nj,njk->nk", later.sums, self.transition),
-            after @ self.state @ after.swapaxes(1, 2) + later.state,
-            np.einsum("nij,nj->ni", after, self.both + carried) + later.both,
-            self.total
-            + 2.0 * np.einsum("ni,ni->n", later.sums, self.both)
-            + np.einsum("ni,ni->n", later.sums, carried)
-            + later.total,
-        )
-
-    def difference(self, start: Array) -> float:
-        """Return the variance of the difference between the sums of the next and this cluster."""
-        change = np.einsum("nj,njk->nk", self.sums, self.lost)
-        before = np.einsum("ni,nij,nj->n", change, start, change)
-        inside = (
-            np.einsum("ni,nij,nj->n", self.sums, self.state, self.sums)
-            - 2.0 * np.einsum("ni,ni->n", self.sums, self.both)
-            + self.total
-        )
-        return float((before + inside + self.total).sum())
-
-
-def _make_one_sample(
-    white: float, times: Array, densities: Array, low_pass: LowPass, interval: float
-) -> tuple[_Cluster, Array]:
-    """Return one sample of every source, white noise last, and the stationary covariance."""
-    n, m = len(times), low_pass.order
-    slow = discretisation.discretise_slow_sources(times, interval, low_pass)
-    A = discretisation.compute_filter_transition(low_pass, interval)
-    transition = np.zeros((n + 1, 1 + m, 1 + m))
-    transition[:, 1:, 1:] = A
-    transition[:n, 0, 0] = slow.decay
-    transition[:n, 1:, 0] = slow.coupling
-    lost = np.eye(1 + m) - transition
-    lost[:n, 0, 0] = slow.lost
-    factor = np.zeros((n + 1, 1 + m, 1 + m))
-    factor[:n, 0, 0] = slow.own
-    factor[:n, 0, 1:] = slow.shared
-    factor[:n, 1:, 1:] = slow.residual
-    factor[:n] *= np.sqrt(densities)[:, None, None]
-    factor[n, 1:, 1:] = math.sqrt(white) * discretisation.compute_white_factor(low_pass, interval)
-    sums = np.zeros((n + 1, 1 + m))
-    sums[:n, 0] = 1.0
-    sums[:, 1:] = low_pass.output
-    state, both = factor.swapaxes(1, 2) @ factor, np.zeros((n + 1, 1 + m))
-    sample = _Cluster(transition, lost, sums, state, both, np.zeros(n + 1))
-    start = np.zeros((n + 1, 1 + m, 1 + m))
-    for i in range(n):
-        # The initial value of a random walk does not matter: it cancels in the difference.
-        alone = (times[i : i + 1], densities[i : i + 1])
-        mean, covariance = discretisation.compute_stationary_distribution(*alone, 0.0, low_pass)
-        variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0
-        start[i, 0, 0] = variance
-        start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
-        start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
-    start[n, 1:, 1:] = discretisation.compute_stationary_distribution(
-        times[:0], densities[:0], white, low_pass
-    )[1]
-    return sample, start
 
 
 _LOW_FREQUENCY = 1e-4  # frequency far below any cut-off, rad/sample
@@ -264,18 +140,6 @@ class SensorModel:
             if term.drive is None:
                 raise ValueError(f"{term} drives no filter (`Term.drive`): no sensor can have it")
 
-    def psd(self, frequency: ArrayLike) -> Array:
-        """Return the two-sided power spectral density of the noise after the low-pass.
-
-        In (rad/s)²/Hz or (m/s²)²/Hz, in the shape of the frequencies, Hz, not 0. It is the density
-        in continuous time, without aliasing, quantization and rounding. Lines and a ramp have no
-        density.
-        """
-        f = np.asarray(frequency, dtype=np.float64)
-        parts = [term.psd(f) for term in self.noise.terms if term.drive is not None]
-        density = np.asarray(np.sum(parts, axis=0)) if parts else np.zeros_like(f)
-        return density * self.low_pass.power(f) if self.low_pass else density
-
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
         """Return the spectrum of the samples, with aliasing, SI^2, in the shape of omega.
 
@@ -289,57 +153,8 @@ class SensorModel:
         behind = [
             term.sampled_spectrum(w, 1.0 / rate) for term in self.noise.terms if term.drive is None
         ]
-        before = compute_sampled_spectrum(self.sources, self.low_pass, w, rate)
+        before = compute_sampled_spectrum(drives_of(self.noise.terms), self.low_pass, w, rate)
         return np.asarray(np.sum(behind, axis=0) + rounding + before)
-
-    def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
-        """Return the exact Allan variance of the samples, (rad/s)² or (m/s²)², in the shape of tau.
-
-        The cluster lengths tau, s, are rounded to whole numbers of samples, at least one; the rate
-        is in Hz. Rounding counts as white noise; drift and motion are not included.
-        """
-        t = np.asarray(tau, dtype=np.float64)
-        n = np.maximum(np.rint(t * rate), 1.0)
-        rounding = self.resolution**2 / 12.0 / n
-        if self.low_pass is None:
-            return self.noise.allan_variance(n / rate, rate) + rounding
-        variance = rounding + compute_allan_variance(self.sources, self.low_pass, n, rate)
-        for term in self.noise.terms:
-            if term.drive is None:
-                left = term.passed(self.low_pass.power)
-                variance = variance + left * term.sampled_allan_variance(n, 1.0 / rate)
-        return variance
-
-    @property
-    def sources(self) -> Sources:
-        """The noise at the input of the low-pass, with flicker noise as a separate number."""
-        return sources_of(self.noise.terms)
-
-
-def sources_of(terms: Sequence[Term]) -> Sources:
-    """Return the noise terms at the input of a filter.
-
-    These are white and flicker noise, Gauss-Markov processes and random walks; others have no
-    density.
-    """
-    drives = drives_of(terms)
-    slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
-    times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
-    return Sources(drives.white, drives.flicker, times, densities)
-
-
-def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
-    """Return processes that approximate flicker noise at the input of the model's filter.
-
-    The list is empty without flicker noise, or without a filter. The rate is in Hz. The density is
-    approximated down to the frequency 1 / (2 duration), with the duration in s.
-    """
-    processes: list[GaussMarkov] = []
-    for term in model.noise.terms:
-        if term.drive is not None and term.drive.flicker and model.low_pass is not None:
-            highest = MAX_FREQUENCY_RATIO * max(model.low_pass.cutoff, rate / 2.0)
-            processes += fit_density_bank(term.drive.flicker, 0.5 / duration, highest)
-    return processes
 
 
 def in_the_log(model: SensorModel, rate: float) -> float:
@@ -384,11 +199,7 @@ def fit_density_bank(B: float, lowest: float, highest: float) -> list[GaussMarko
 
     The variances are fitted by non-negative least squares of the relative error. B is the bias
     instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
-
-    Raises ValueError if the band is empty.
     """
-    if not 0 < lowest < highest:
-        raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
     times, variances = _fit_unit_bank(round(math.log10(highest / lowest), 6))
     processes = []
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):

@@ -95,11 +95,7 @@ SIMULATIONS: Hook[Simulation] = Hook("simulations")
 
 
 def make_axis_model(settings: AxisSettings, channel: str) -> SensorModel:
-    """Return the model of an axis, ``gyro_x`` to ``accel_z``, in SI.
-
-    Raises UnitError if a unit has another dimension than its figure. Raises ValueError if a figure
-    is out of its range.
-    """
+    """Return the model of an axis in SI; raises UnitError, or ValueError for a figure's range."""
     quantity, figures = quantity_of(channel), settings.si(channel)
     drift, low_pass = settings.drift, settings.low_pass
     return SensorModel(
@@ -120,10 +116,7 @@ def make_axis_model(settings: AxisSettings, channel: str) -> SensorModel:
 
 
 def make_imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
-    """Return the model of a sensor, in SI, from its axes by channel and their common settings.
-
-    Raises ValueError as `make_axis_model`, with the name of the channel.
-    """
+    """Return the model of a sensor in SI; raises ValueError with the name of the channel."""
     models = {}
     for channel, axis in axes.items():
         try:

@@ -16,16 +16,21 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numba import njit
+from scipy.linalg import expm
 
 from imubench_pipeline.noise import Term
+from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate.discretisation import (
-    compute_filter_transition,
     compute_stationary_distribution,
     compute_white_factor,
     discretise_held_input,
     discretise_slow_sources,
 )
-from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
+from imubench_pipeline.simulate.model import (
+    MAX_FREQUENCY_RATIO,
+    SensorModel,
+    fit_density_bank,
+)
 from imubench_pipeline.typing import Array
 
 STARTED, INPUT, TEMPERATURE, LAG = range(4)
@@ -148,8 +153,8 @@ def simulate_blocks(
 ) -> Iterator[Array]:
     """Yield a simulated log of one axis, rad/s or m/s², in blocks of shape (block,).
 
-    The log does not depend on the size of the blocks; the last one may be shorter. The rate is in
-    Hz, the length of the log in samples. For ``rng`` see
+    The log does not depend on the size of the blocks, a multiple of `SAMPLES_PER_CHUNK`; the last
+    one may be shorter. The rate is in Hz, the length of the log in samples. For ``rng`` see
     `imubench_pipeline.noise.simulate.channel_rng`. ``true`` returns the true rate or specific force
     along the axis, rad/s or m/s², for the indices of the first sample and one past the last; 0 by
     default. ``temperature`` does so in °C; by default it is the reference of the drift. Raises
@@ -158,19 +163,14 @@ def simulate_blocks(
     if not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")
     axis = _Axis(model, rate, samples, rng)
-    waiting: list[Array] = []
-    ready = 0
-    for start in range(0, samples, SAMPLES_PER_CHUNK):
-        stop = min(start + SAMPLES_PER_CHUNK, samples)
-        waiting.append(axis.samples(start, stop, true, temperature))
-        ready += stop - start
-        while ready >= block:
-            whole = np.concatenate(waiting) if len(waiting) > 1 else waiting[0]
-            yield whole[:block]
-            ready -= block
-            waiting = [whole[block:]]
-    if ready:
-        yield np.concatenate(waiting)
+    for start in range(0, samples, block):
+        stop = min(start + block, samples)
+        yield np.concatenate(
+            [
+                axis.samples(first, min(first + SAMPLES_PER_CHUNK, stop), true, temperature)
+                for first in range(start, stop, SAMPLES_PER_CHUNK)
+            ]
+        )
 
 
 class _Axis:
@@ -184,15 +184,18 @@ class _Axis:
         duration = max(samples, 2) * interval
         # Flicker noise is a bank of processes.
         terms: list[Term] = []
-        banks: list[Term] = list(bank_for(model, rate, duration))
+        banks: list[Term] = []
         for term in model.noise.terms:
             if term.drive is None or not term.drive.flicker:
                 terms.append(term)
             elif model.low_pass is None:
                 banks += term.realised(interval, duration)
-        sources = sources_of([*terms, *banks])
-        self._times, self._densities = sources.times, sources.densities
-        self._white = sources.white
+            else:
+                # Down to the frequency 1 / (2 duration)
+                highest = MAX_FREQUENCY_RATIO * max(model.low_pass.cutoff, rate / 2.0)
+                banks += fit_density_bank(term.drive.flicker, 0.5 / duration, highest)
+        drives = drives_of([*terms, *banks])
+        self._times, self._densities, self._white = drives.times, drives.densities, drives.white
         begin, self._noise, lines, self._counts = rng.spawn(4)
         self._slow, self._filter = self._discretise(interval)
         drift = model.drift
@@ -239,7 +242,8 @@ class _Axis:
         parts = (slow.residual * scale[:, None, None]).reshape(-1, low_pass.order)
         white_part = math.sqrt(self._white) * compute_white_factor(low_pass, interval)
         factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
-        return states, (compute_filter_transition(low_pass, interval), factor, low_pass.output, 0.0)
+        transition = np.asarray(expm(low_pass.transition * interval))
+        return states, (transition, factor, low_pass.output, 0.0)
 
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
@@ -249,12 +253,12 @@ class _Axis:
         size = stop - start
         entering = np.full(size, model.bias)
         if true is not None:
-            entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), size, "motion")
+            entering += (1.0 + model.scale_error) * _check_signal(true(start, stop), "motion")
         if model.noise.R:
             entering += model.noise.R / rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
-            temperatures = _check_signal(temperature(start, stop), size, "temperature")
+            temperatures = _check_signal(temperature(start, stop), "temperature")
         normal = self._noise.standard_normal((size, len(self._x) + max(len(self._e), 1)))
         log = np.empty(size)
         states = (self._memory, self._x, self._e)
@@ -278,10 +282,8 @@ class _Axis:
         return log
 
 
-def _check_signal(values: Array, size: int, what: str) -> Array:
+def _check_signal(values: Array, what: str) -> Array:
     signal = np.ascontiguousarray(values, dtype=np.float64)
-    if signal.shape != (size,):
-        raise ValueError(f"{what} has shape {signal.shape}, expected ({size},)")
     if not np.isfinite(signal.sum()):
         raise ValueError(f"{what} has values that are not finite")
     return signal

@@ -32,7 +32,8 @@ def compare_with_datasheet(
     rows, of_curves = list[DatasheetRow](), list[DatasheetCurveRow]()
     for channel, by_method in read_estimates(folder / "parameters.parquet").items():
         row = partial(DatasheetRow, sensor=sensor, recording=recording, channel=channel)
-        tau = measured[channel].up_to(sections["longest"])
+        curve = measured[channel]
+        tau = curve.tau[curve.cluster_size <= sections["longest"] * curve.samples]
         for estimate in by_method:
             for delta in deltas(datasheet, channel, estimate, tau, tolerance):
                 rows.append(row(method=estimate.method, **asdict(delta)))

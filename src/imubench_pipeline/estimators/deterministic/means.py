@@ -62,10 +62,7 @@ class Means:
 def average_blocks(
     blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
-    """Return the block means of a log in one pass, in bounded memory.
-
-    The blocks are the log in order, in SI, NaN where a sample is missing.
-    """
+    """Return the block means of a log in consecutive blocks, SI, NaN where a sample is missing."""
     spans = list_spans(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MAX_BLOCKS), min(_MIN_BLOCK_SAMPLES, max(total // _MIN_BLOCKS, 1)))
@@ -162,10 +159,7 @@ class Stationarity:
 
 
 def assess_stationarity(means: Means) -> Stationarity | None:
-    """Return the change of the power of the fast noise over the longest part of a log.
-
-    None for a short log, or one with constant samples.
-    """
+    """Return the change of the fast noise over the longest part; None if short or constant."""
     part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _MIN_SECTION_BLOCKS or means.block < 2:

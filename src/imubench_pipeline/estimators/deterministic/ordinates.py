@@ -16,7 +16,7 @@ import numpy as np
 import scipy.fft
 
 from imubench_pipeline.estimators.deterministic.means import Means
-from imubench_pipeline.estimators.spectrum import Spectrum, make_bin_edges
+from imubench_pipeline.estimators.spectrum import Spectrum, make_bins
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.typing import Array
 
@@ -126,21 +126,15 @@ class Ordinates:
     def spectrum(self, residual: Array, weight: Array) -> Spectrum:
         """Return the binned spectrum of coefficients, each counted with its ``weight``."""
         order, interval = self._order, self.means.interval
-        frequency, length = self.frequency[order], self.length[order]
-        edges = make_bin_edges(frequency)
-        counts = np.diff(np.append(edges, len(order)))
-        last = edges + counts - 1
+        edges, columns = make_bins(self.frequency[order], self.length[order])
         ordinates = np.add.reduceat(weight[order], edges)
         power = np.add.reduceat(residual[order] ** 2, edges) * interval
         zeros = np.zeros(len(edges))
         return Spectrum(
-            frequency=np.add.reduceat(frequency, edges) / counts,
-            lower=frequency[edges] - 0.25 / length[edges],
-            upper=frequency[last] + 0.25 / length[last],
+            **columns,
             ordinates=ordinates,
             density=power / ordinates,
             block=np.full(len(edges), self.means.block),
-            length=np.add.reduceat(length, edges) / counts,
             ramp=zeros,
             cross=zeros,
             rate=self.means.rate,
@@ -149,32 +143,31 @@ class Ordinates:
         )
 
     @cached_property
-    def _whittle(self) -> Whittle:
-        highest = min(0.5 / self.means.interval, float(self.frequency[self.used].max()))
-        return make_whittle(
-            self.spectrum(self.coefficient, np.ones_like(self.length)), highest, COARSE
-        )
+    def whittle(self) -> Whittle:
+        """The likelihood of the coefficients as they are."""
+        spectrum = self.spectrum(self.coefficient, np.ones_like(self.length))
+        return make_whittle(spectrum, float(self.frequency[self.used].max()), COARSE)
+
+    def fit_noise(self, residual: Array, leverage: Array | float = 0.0) -> tuple[Maximum, Array]:
+        """Return the noise model of coefficients less regressors, and its density, shape (k,)."""
+        weight = np.maximum(np.ones_like(residual) - leverage, _MIN_WEIGHT)
+        noise = self.whittle.of(self.spectrum(residual, weight)).maximum(NOISE_TERMS)
+        return noise, self.density(noise)
 
     def density(self, noise: Maximum) -> Array:
         """Return the density of a noise model at each ordinate, shape (k,)."""
-        bins = self._whittle.spectrum.frequency
-        logarithm = np.log(self._whittle.density(noise))
+        bins = self.whittle.spectrum.frequency
+        logarithm = np.log(self.whittle.density(noise))
         return np.exp(np.interp(np.log(self.frequency), np.log(bins), logarithm))
 
     def fit(self, regressors: Sequence[Regressor], start: Array | None = None) -> Fit:
-        """Fit noise and regressors together.
-
-        ``start``, shape (k,), is the noise density for the weights of the first iteration.
-        """
-        weight, residual = np.ones_like(self.coefficient), self.coefficient
+        """Fit noise and regressors; ``start``, shape (k,), is the density for the first weights."""
+        residual, leverage = self.coefficient, np.zeros_like(self.coefficient)
         density = start
         for _ in range(_FIT_ROUNDS if regressors else 1):
             if density is not None:
                 _, _, residual, leverage = self.solve(regressors, density)
-                weight = np.maximum(1.0 - leverage, _MIN_WEIGHT)
-            whittle = self._whittle.of(self.spectrum(residual, weight))
-            noise = whittle.maximum(NOISE_TERMS)
-            density = self.density(noise)
+            noise, density = self.fit_noise(residual, leverage)
         assert density is not None  # it was set in every round
         sizes, covariance, residual, leverage = self.solve(regressors, density)
         fitted = sizes, covariance, noise, density, residual, leverage
@@ -186,7 +179,7 @@ class Ordinates:
         beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
         if beyond.sum() < 4 * NOISE_TERMS.parameters:
             return fit.density
-        whittle = self._whittle.select(spectrum, beyond)
+        whittle = self.whittle.select(spectrum, beyond)
         return self.density(whittle.maximum(fit.noise.terms))
 
     def log_likelihood(self, residual: Array, density: Array) -> float:
@@ -209,11 +202,17 @@ class Ordinates:
         for regressor in regressors:
             X[row : row + regressor.columns, self.part(regressor.part)] = self.columns(regressor)
             row += regressor.columns
-        weighted = X * weight
-        gram = weighted @ X.T
-        norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        inverse = np.linalg.pinv(gram / np.outer(norm, norm), rcond=1e-10, hermitian=True)
-        covariance = inverse / np.outer(norm, norm)
-        sizes = covariance @ (weighted @ self.coefficient)
-        leverage = np.einsum("ak,ak->k", weighted, covariance @ X)
+        sizes, covariance, _ = solve_weighted(X, weight, self.coefficient)
+        leverage = np.einsum("ak,ak->k", X * weight, covariance @ X)
         return sizes, covariance, self.coefficient - sizes @ X, leverage
+
+
+def solve_weighted(columns: Array, weight: Array, coefficient: Array) -> tuple[Array, Array, Array]:
+    """Return amplitudes of columns (p, k), their covariance, and products with coefficients."""
+    weighted = columns * weight
+    gram = weighted @ columns.T
+    norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inverse = np.linalg.pinv(gram / np.outer(norm, norm), rcond=1e-10, hermitian=True)
+    covariance = inverse / np.outer(norm, norm)
+    target = weighted @ coefficient
+    return covariance @ target, covariance, target

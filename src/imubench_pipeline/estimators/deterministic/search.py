@@ -49,10 +49,7 @@ class Score:
 
 
 class Gain:
-    """Gain of log likelihood by additional regressors of one part, for given noise.
-
-    ``regressors`` are in the fit already; ``density``, shape (k,): of the noise, SI²/Hz.
-    """
+    """Gain of log likelihood by more regressors of a part, in noise of a density (k,), SI²/Hz."""
 
     def __init__(
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int
@@ -111,10 +108,7 @@ class Gain:
 def find_best_scores(
     ordinates: Ordinates, fit: Fit, density: Array, *, smooth: bool = False
 ) -> Iterator[Score]:
-    """Yield the best additional regressor of each kind in each part, given a fit.
-
-    ``density``, shape (k,): of the noise, SI²/Hz; ``smooth`` excludes steps.
-    """
+    """Yield the best additional regressor by kind and part; ``smooth`` excludes steps."""
     chance = FALSE_ALARM_PROBABILITY / len(ordinates.sizes)
     restarts = list_restarts(ordinates.means)
     for part, n in enumerate(ordinates.sizes):

@@ -31,20 +31,15 @@ class Verdict:
         if self.doubt is None:
             return estimate
 
-        def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-            return {
-                name: replace(each, status="doubtful", reason=self.doubt)
-                if name in ("B", "T_B", "K", *CURVE) and each.status in ("ok", "doubtful")
-                else each
-                for name, each in parameters.items()
-            }
+        def doubt(name: str, each: Parameter) -> Parameter:
+            if name in ("B", "T_B", "K", *CURVE) and each.status in ("ok", "doubtful"):
+                return replace(each, status="doubtful", reason=self.doubt)
+            return each
 
-        return replace(
-            estimate,
-            parameters=of(estimate.parameters),
-            further=[of(group) for group in estimate.further],
-            curve=of(estimate.curve),
-        )
+        further = [
+            {name: doubt(name, each) for name, each in group.items()} for group in estimate.further
+        ]
+        return replace(estimate.revised(doubt), further=further)
 
 
 def assess_signals(

@@ -46,11 +46,7 @@ class Solutions:
 
 
 class TermSearch:
-    """The Allan variance of each term on a grid of tau, and the search for the best set of terms.
-
-    ``tau``, s, and ``averaged``, samples present in a cluster, have the shape (m,); the rate is in
-    Hz; ``times``, shape (t,), are the correlation times that are tried, s.
-    """
+    """Search for the best set of terms at tau, averaged, (m,), and times, (t,), s; rate in Hz."""
 
     def __init__(self, tau: Array, rate: float, averaged: Array, times: Array) -> None:
         self.times = times
@@ -90,11 +86,7 @@ class TermSearch:
         return float(likely[0]), float(likely[-1])
 
     def solve(self, variances: Array, whitening: Array) -> Solutions:
-        """Return the best non-negative solutions.
-
-        ``variances``, shape (q, m), are the curves; ``whitening``, shape (r, m), turns their errors
-        into independent ones of variance 1.
-        """
+        """Return the best non-negative solutions of curves, (q, m), whitened by (r, m)."""
         target = variances @ whitening.T
         columns = whitening @ self._columns
         size = np.linalg.norm(columns, axis=1)

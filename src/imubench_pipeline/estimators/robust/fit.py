@@ -119,11 +119,8 @@ def fit(
         else one
         for symbol, one in estimate.parameters.items()
     }
-    return replace(
-        estimate,
-        parameters={symbol: _add_length(one, duration) for symbol, one in parameters.items()},
-        curve={name: _add_length(one, duration) for name, one in estimate.curve.items()},
-    )
+    estimate = replace(estimate, parameters=parameters)
+    return estimate.revised(lambda _, one: _add_length(one, duration))
 
 
 def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, float]:
@@ -254,13 +251,8 @@ def _fit_points(points: _Points) -> _Fitted:
 def _choose_correction(
     points: _Points, curves: Array, weights: Array, plain: Solutions
 ) -> tuple[Solutions, NDArray[np.bool_]]:
-    """Return the fits to curves with the correction of the short end, and which are better.
-
-    ``plain``: the fits without.
-    """
-    column = points.curve.averaged**-2.0
-    image = weights @ column
-    free = weights - np.outer(image, image @ weights) / (image @ image)
+    """Return fits with the correction of the short end, and which are better than ``plain``."""
+    column, image, free = _leave_out_correction(points, weights)
     bent = points.search.solve(curves, free)
     of_bent = [
         points.search.design(T) @ squares
@@ -270,6 +262,13 @@ def _choose_correction(
     first = int(np.flatnonzero(weights.any(axis=0))[0])
     small = size * column[first] > -_MAX_CORRECTION * curves[:, first]
     return bent, (plain.cost - bent.cost > _GAIN_OF_BEND) & small
+
+
+def _leave_out_correction(points: _Points, weights: Array) -> tuple[Array, Array, Array]:
+    """Return the correction of the short end, its image, and weights orthogonal to the image."""
+    column = points.curve.averaged**-2.0
+    image = weights @ column
+    return column, image, weights - np.outer(image, image @ weights) / (image @ image)
 
 
 @dataclass(frozen=True)
@@ -324,11 +323,9 @@ def _fit_weighted(
 
 def _fit_whitened(points: _Points, whitening: Array, bent: bool) -> tuple[Solutions, Array, Array]:
     """Return the solution, its variances, and the whitening that leaves out a correction."""
-    column = points.curve.averaged**-2.0
-    image = whitening @ column
-    free = whitening
-    if bent:  # the fit to that part of the data that is orthogonal to the correction
-        free = whitening - np.outer(image, image @ whitening) / (image @ image)
+    column, image, free = _leave_out_correction(points, whitening)
+    if not bent:
+        free = whitening
     solution = points.search.solve(points.variance[None], free)
     expected = points.evaluate(solution)
     expected = np.maximum(expected, np.finfo(np.float64).tiny)

@@ -65,11 +65,7 @@ def compute_part_variances(
     gaps: Gaps = NO_GAPS,
     segments: Sequence[Span] | None = None,
 ) -> PartVariances:
-    """Return the Allan variances of equal parts of a log that comes in blocks.
-
-    Samples, gaps and segments are as in `imubench_pipeline.allan.of_blocks`, of which ``curve`` is
-    the result.
-    """
+    """Return the Allan variances of equal parts of a log in blocks (see `allan.of_blocks`)."""
     edges = np.linspace(0, curve.samples, PARTS + 1).astype(np.int64)
     spans: list[Span] = []
     owner: list[int] = []

@@ -181,10 +181,7 @@ def _describe(
 
 
 def _limit_lag(value: float, posterior: Posterior, by_path: float, longest: float) -> Parameter:
-    """Return the lag with the most likely values that have 95 % of its distribution.
-
-    Equal tails would exclude a lag of 0 in half of the logs without a lag.
-    """
+    """Return the lag with its most likely 95 %: equal tails would often exclude a lag of 0."""
     order = np.argsort(posterior.lag_weights)[::-1]
     inside = 1 + int(np.searchsorted(np.cumsum(posterior.lag_weights[order]), 0.95))
     likely = posterior.lags[order[:inside]]

@@ -47,10 +47,7 @@ class Readings:
 
 
 def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
-    """Return the block means of temperature readings, °C, NaN where missing, in one pass.
-
-    Raises ValueError if no reading is present.
-    """
+    """Return block means of readings, °C, NaN where missing; raises ValueError if all are."""
     width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
     begins = [np.arange(start, stop, width) for start, stop in segments]
     begin = np.concatenate(begins)
@@ -169,22 +166,14 @@ class TemperaturePath:
         return float(np.ptp(self.value))
 
     def at(self, points: NDArray[Any], values: Array) -> Array:
-        """Interpolate values at the knots, shape (k,), within each segment.
-
-        ``points``, shape (n,), are ascending places on the grid of the log; between two segments
-        the value at the last knot is returned.
-        """
+        """Interpolate values at the knots, (k,), at ascending points of the grid, by segment."""
         cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
         pieces = zip(np.split(points, cuts), self.parts, strict=True)
         pieces_at = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return means over blocks, shape (count,), of values at the knots, shape (k,).
-
-        ``first`` is the first sample of ``count`` adjacent blocks of ``block`` samples in a
-        segment.
-        """
+        """Return means over ``count`` blocks from a first sample, of values at the knots, (k,)."""
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
         # The integral from the first edge; flat beyond the first and the last knot.
@@ -195,10 +184,7 @@ class TemperaturePath:
         return np.asarray(np.diff(integral[np.searchsorted(points, edges)]) / block)
 
     def apply_lag(self, values: Array, rate: float, lag: float) -> Array:
-        """Return temperatures at the knots, shape (k,), behind a lag in s (see `apply_lag`).
-
-        Each segment begins in equilibrium. ``rate``: of the log, Hz.
-        """
+        """Return temperatures at the knots, (k,), behind a lag, s; segments begin at rest."""
         parts = [apply_lag(self.sample[part] / rate, values[part], lag) for part in self.parts]
         return np.concatenate(parts)
 
@@ -236,10 +222,7 @@ def estimate_temperature_path(
 
 
 def _measure(read: Readings, spread: float) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return the temperature of each block by its readings, its variance, and its stay (0: none).
-
-    All shapes are (k,).
-    """
+    """Return temperature, variance and stay (0: none) of each block, shapes (k,)."""
     n = len(read.mean)
     # The noise of block means, by their second differences: the temperature changes slowly.
     bends = np.abs(np.diff(read.mean, 2))
@@ -344,10 +327,8 @@ def apply_lag(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
     Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
-    equilibrium at the first. Raises ValueError if the lag, s, is below 0 or not finite.
+    equilibrium at the first. The lag is in s, from 0.
     """
-    if not (lag >= 0.0 and math.isfinite(lag)):
-        raise ValueError(f"the lag is {lag} s, expected a time from 0")
     values = np.asarray(values, dtype=np.float64)
     if lag == 0.0:
         return values.copy()

@@ -12,16 +12,15 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from imubench_pipeline.estimators.deterministic.ordinates import NOISE_TERMS, Ordinates
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, solve_weighted
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.whittle import COARSE, Maximum, make_whittle
+from imubench_pipeline.estimators.whittle import Maximum
 from imubench_pipeline.typing import Array
 
 LAGS = 16  # lags of a scan
 _MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0  # s
 _ROUNDS = 3  # of effect and noise; more change nothing in benchmarks/temperature.py
-_MIN_WEIGHT = 0.05  # weight of an ordinate that the temperature explains almost completely
 _FINE_LAGS = 48
 _MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not in the fine scan
 _MIN_OTHER_NOISE = 1e-3  # least fraction of the density that is not random walk
@@ -68,20 +67,13 @@ class Posterior:
 
 
 class Regression:
-    """The ordinates of a log, and of its temperature at any lag.
-
-    ``rate`` is the rate of the log, Hz.
-    """
+    """The ordinates of a log at a rate, Hz, and of its temperature at any lag."""
 
     def __init__(self, ordinates: Ordinates, path: TemperaturePath, rate: float) -> None:
         self.ordinates, self.path, self.rate = ordinates, path, rate
         self.block = ordinates.means.block
         self._known: dict[tuple[float, Shape], Array] = {}
-        highest = float(ordinates.frequency[ordinates.used].max())
-        ones = np.ones_like(ordinates.coefficient)
-        spectrum = ordinates.spectrum(ordinates.coefficient, ones)
-        self.bins = len(spectrum.density)
-        self._whittle = make_whittle(spectrum, highest, COARSE)
+        self.bins = len(ordinates.whittle.spectrum.density)
 
     def means(self, knots: Array) -> Array:
         """Return the mean in each block of the log of a signal at the knots of the path."""
@@ -138,13 +130,8 @@ class Regression:
 
     def solve(self, columns: Array, density: Array) -> tuple[Array, Array, float]:
         """Return beta, its covariance, and the log likelihood that it gains."""
-        weighted = columns * self.ordinates.weights(density)
-        information = weighted @ columns.T
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-        covariance = inverse / np.outer(scale, scale)
-        target = weighted @ self.ordinates.coefficient
-        beta = covariance @ target
+        weight, coefficient = self.ordinates.weights(density), self.ordinates.coefficient
+        beta, covariance, target = solve_weighted(columns, weight, coefficient)
         return beta, covariance, 0.5 * float(target @ beta)
 
     def gain(self, effect: Effect, shape: Shape) -> float:
@@ -154,13 +141,10 @@ class Regression:
     @cached_property
     def plain(self) -> tuple[Maximum, Array]:
         """The noise of the log as it is, and its density at each ordinate."""
-        return self.fit_noise(self.ordinates.coefficient)
+        return self.ordinates.fit_noise(self.ordinates.coefficient)
 
     def fit(self, shape: Shape, lags: Array) -> Effect:
-        """Return a fit by turns of effect and noise.
-
-        ``lags``, shape (l,): the lags that are tried, s.
-        """
+        """Return a fit by turns of effect and noise, at the best of lags, shape (l,), s."""
         density = self.plain[1]
         for _ in range(_ROUNDS):
             gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]
@@ -170,15 +154,9 @@ class Regression:
             residual = self.ordinates.coefficient - beta @ columns
             leverage = np.einsum("ik,ij,jk->k", columns, covariance, columns)
             leverage *= self.ordinates.weights(density)
-            noise, density = self.fit_noise(residual, np.maximum(1.0 - leverage, _MIN_WEIGHT))
+            noise, density = self.ordinates.fit_noise(residual, leverage)
         log_likelihood = self.ordinates.log_likelihood(residual, density)
         return Effect(shape, lag, beta, covariance, noise, density, log_likelihood)
-
-    def fit_noise(self, residual: Array, weight: Array | None = None) -> tuple[Maximum, Array]:
-        """Return the noise model of coefficients, each with its weight, and its density."""
-        weight = np.ones_like(residual) if weight is None else weight
-        noise = self._whittle.of(self.ordinates.spectrum(residual, weight)).maximum(NOISE_TERMS)
-        return noise, self.ordinates.density(noise)
 
     def bracket_likely_lags(self, effect: Effect) -> Array:
         """Return a fine scan of the lags that are not excluded."""

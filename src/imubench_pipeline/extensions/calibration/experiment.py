@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.missing import yield_present_samples
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.terms.base import SampleBlocks
 from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
@@ -100,27 +101,22 @@ class Experiment:
         stop = np.concatenate([of_dwell[1:] for of_dwell in edges])
         sense = np.array([dwell.sense for dwell in self.dwells], dtype=np.float64)
         return Blocks(
-            start,
-            stop,
-            stop - start,
-            np.repeat(sense, number),
-            np.repeat(np.arange(len(edges)), number),
-            self.rate,
-            self.latitude,
+            start=start,
+            stop=stop,
+            count=stop - start,
+            sense=np.repeat(sense, number),
+            dwell=np.repeat(np.arange(len(edges)), number),
+            rate=self.rate,
+            latitude=self.latitude,
         )
 
 
-@dataclass(frozen=True)
-class Blocks:
+@dataclass(frozen=True, kw_only=True)
+class Blocks(SampleBlocks):
     """Blocks of samples, each within one dwell, in their order."""
 
-    # start, stop: shape (b,); first sample of the log, and the one past the last
-    start: Integers
-    stop: Integers
-    count: Integers  # shape (b,); samples that are present
     sense: Array  # shape (b,); 1 north, -1 south
     dwell: Integers  # shape (b,); number of the dwell, from 0, rising
-    rate: float  # Hz
     latitude: float  # rad
 
     def __len__(self) -> int:
@@ -135,11 +131,6 @@ class Blocks:
     def end(self) -> Array:
         """Time at the end of each block, s from the first sample, shape (b,)."""
         return np.asarray((self.stop - self.start[0]) / self.rate)
-
-    @property
-    def middle(self) -> Array:
-        """Mean time of the samples of each block, s from the first sample, shape (b,)."""
-        return np.asarray((0.5 * (self.start + self.stop - 1) - self.start[0]) / self.rate)
 
     @property
     def duration(self) -> float:
@@ -162,14 +153,8 @@ class Blocks:
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Blocks":
         """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
-        return replace(
-            self,
-            start=self.start[which],
-            stop=self.stop[which],
-            count=self.count[which],
-            sense=self.sense[which],
-            dwell=self.dwell[which],
-        )
+        arrays = ("start", "stop", "count", "sense", "dwell")
+        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def of_dwells(self) -> "Blocks":
         """Return one block per dwell, from the first sample of its blocks to the last."""
@@ -193,7 +178,6 @@ class Measured:
     means: Array  # shape (1, b); rad/s, a row for the one log
     missing: int  # samples within dwells that are missing (NaN)
     left_out: int  # samples present in blocks with too few
-    turning: int  # samples of the log, present or not, outside of dwells
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
@@ -228,7 +212,6 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         (total[enough] / count[enough])[None, :],
         int((whole.count - count).sum()),
         int(count[~enough].sum()),
-        length - experiment.samples_in_dwells,
     )
 
 

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.settings.experiments import Experiment, Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
     Angle,
@@ -23,9 +24,6 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.units import parse_quantity
 
 _MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
-
-TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-"""The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
@@ -183,13 +181,27 @@ class OnRateTable(Experiment):
         return stated_gyro(self.channel, channels, "is along the axis of the table")
 
 
-class InPositions(Experiment):
+class Turned(Experiment):
+    """A log of a sensor that is turned by a schedule, and is at rest between the turns."""
+
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    dwell: Time = Field(
+        description="nominal time from the start of one turn to the start of the next"
+    )
+
+    def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
+        """Return one of its time settings, s."""
+        return parse_quantity(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """Latitude, rad."""
+        return parse_quantity(self.latitude, "angle")
+
+
+class InPositions(Turned):
     """A triad that is turned about its z axis by a schedule, and is at rest between the turns."""
 
-    latitude: Latitude = Field(
-        description="latitude of the place, with its unit; south is negative"
-    )
-    dwell: Time = Field(description="from the start of one turn to the start of the next")
     turning: TimeFromZero = Field(
         "2 s", description="part of this time, at its end, that the turn takes"
     )
@@ -211,15 +223,6 @@ class InPositions(Experiment):
             )
         return self
 
-    def seconds(self, name: str) -> float:
-        """Return one of its time settings, s."""
-        return parse_quantity(getattr(self, name), "time")
-
-    @property
-    def latitude_si(self) -> float:
-        """The latitude, rad."""
-        return parse_quantity(self.latitude, "angle")
-
     def angle(self, number: int) -> float:
         """Return the angle of a position, from 0, to the first, rad; it grows from turn to turn."""
         angles = [parse_quantity(text, "angle") for text in self.turned]
@@ -227,7 +230,7 @@ class InPositions(Experiment):
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
         """Raise ValueError if the log lacks one of the six axes."""
-        missing = [name for name in TRIAD if name not in channels]
+        missing = [name for name in CHANNELS if name not in channels]
         if missing:
             raise ValueError(
                 f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"
@@ -245,11 +248,6 @@ class SimulatedTable(OnRateTable):
         if not self.steps:
             raise ValueError("steps is missing; expected the steady rates of the table")
         return self
-
-    @property
-    def declared(self) -> OnRateTable:
-        """The notes of a log like this one."""
-        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
 
 
 class SimulatedPositions(InPositions):
@@ -269,22 +267,12 @@ class SimulatedPositions(InPositions):
         heading = math.remainder(heading, 2.0 * math.pi)
         return {"roll": roll, "pitch": pitch, "heading": heading}
 
-    @property
-    def declared(self) -> InPositions:
-        """The notes of a log like this one."""
-        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
-
 
 class SimulatedRest(AtRest):
     """A gyro at rest that senses its part of the Earth's rate."""
 
     true_heading: Angle = Field("0 deg", description="true heading of the axis, if heading is null")
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
-
-    @property
-    def declared(self) -> AtRest:
-        """The notes of a log like this one."""
-        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
 
     @property
     def true(self) -> Pointing:

@@ -7,25 +7,25 @@ import numpy as np
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.extensions.calibration.settings import (
-    TRIAD,
     SimulatedPositions,
     SimulatedRest,
     SimulatedTable,
 )
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.profiles import Constant, SampledProfile
+from imubench_pipeline.simulate.profiles import Profile, make_constant, make_sampled
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
 
 
-def simulate_rest(recording: SimulatedRecording, rate: float) -> dict[str, Constant]:
+def simulate_rest(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
     """Return the part of the Earth's rate that a gyro at rest senses."""
     rest = recording.block(SimulatedRest)
     assert rest is not None
-    return {str(recording.moved_gyro): Constant(rest.true.rate)}
+    return {str(recording.moved_gyro): make_constant(rest.true.rate)}
 
 
-def simulate_rate_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_rate_table(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
     """Return the readings of a gyro on a table that ramps linearly from rate to rate."""
     table = recording.block(SimulatedTable)
     assert table is not None
@@ -33,11 +33,11 @@ def simulate_rate_table(recording: SimulatedRecording, rate: float) -> dict[str,
     rates = np.repeat([parse_quantity(step.rate, "angular_rate") for step in table.steps], 2)
     true = np.interp(np.arange(recording.samples) / rate, times, rates)
     earth = 0.0 if table.axis is None else table.axis.pointing.rate
-    indicated = SampledProfile(table.scale_factor * (true + earth), rate)
+    indicated = make_sampled(table.scale_factor * (true + earth), rate)
     return {str(recording.moved_gyro): indicated}
 
 
-def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
     """Return the readings of a triad that turns at a steady rate between its positions."""
     positions, samples = recording.block(SimulatedPositions), recording.samples
     assert positions is not None
@@ -52,7 +52,7 @@ def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, 
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
     attitude = matrix(**positions.true_angles)
     true = compute_readings(Site(latitude=positions.latitude_si), attitude, angle, turned)
-    return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
+    return {name: make_sampled(true[:, k], rate) for k, name in enumerate(CHANNELS)}
 
 
 def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:

@@ -19,7 +19,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel
-from imubench_pipeline.simulate.profiles import SampledProfile
+from imubench_pipeline.simulate.profiles import Profile, make_sampled
 from imubench_pipeline.simulate.simulation import simulate
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
@@ -38,32 +38,26 @@ ASSUMED_LATITUDE = math.radians(-23.3)
 ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
-@dataclass(frozen=True)
-class RunDesign:
-    """A run as its source describes it."""
+def design_run(
+    duration: float, period: float, turning: float, rate: float, latitude: float
+) -> Experiment:
+    """Return the design of a run as its source describes it.
 
-    dwell: float  # from turn to turn, s
-    turning: float  # turning time within it, s
-    rate: float  # sampling rate, Hz
-    latitude: float  # rad
-
-    def experiment(self, duration: float) -> Experiment:
-        """Return the design of a run of this duration, s."""
-        return Experiment.regular(
-            dwell=self.dwell - self.turning,
-            turning=self.turning,
-            dwells=round(duration / self.dwell),
-            rate=self.rate,
-            latitude=self.latitude,
-        )
-
-
-PAPER_DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
+    The duration, the period from turn to turn and the time of a turn are in s, the rate in Hz, the
+    latitude in rad.
+    """
+    return Experiment.regular(
+        dwell=period - turning,
+        turning=turning,
+        dwells=round(duration / period),
+        rate=rate,
+        latitude=latitude,
+    )
 
 
 def design_paper_run(minutes: float) -> Experiment:
     """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
-    return PAPER_DESIGN.experiment(60.0 * minutes)
+    return design_run(60.0 * minutes, PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 
 
 @dataclass(frozen=True)
@@ -86,7 +80,7 @@ def simulate_runs(
 ) -> Runs:
     """Draw exact block means of runs; the rate, and sigma of the fixed biases, are in rad/s."""
     block_model = discretise_blocks(model, blocks, turn_on_bias)
-    m = len(block_model.names)
+    m = len(block_model.initial)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
     for k, which in enumerate(block_model.which):
@@ -140,7 +134,7 @@ def compute_true_rate(experiment: Experiment, earth_rate: float, transient: Arra
     return true
 
 
-def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
     """Return the readings of a gyro that is turned by a schedule; the transients differ."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
@@ -161,4 +155,4 @@ def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str
     before = np.full(round(turns.seconds("start") * rate), true[0])
     after = np.full(samples, true[-1])
     sensed = np.concatenate([before, true, after])[:samples]
-    return {str(recording.moved_gyro): SampledProfile(sensed, rate)}
+    return {str(recording.moved_gyro): make_sampled(sensed, rate)}

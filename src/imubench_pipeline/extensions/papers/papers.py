@@ -84,7 +84,10 @@ def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values
     rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
     log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
     curve = allan_variance(log, _RATE, overlap="octave")
-    estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FIT_METHODS)]
+    estimates = [
+        reading.read(curve),
+        *(least_squares.fit(curve, method=m, with_limits=False) for m in _FIT_METHODS),
+    ]
     spectrum, _ = compute_spectra([log], samples, _RATE)
     whittle = before.of(spectrum) if before else make_whittle(spectrum, _RATE / 2.0)
     best = whittle.maximum(PAPERS_MODEL)
@@ -135,7 +138,7 @@ def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
         result = evaluate(line, evidence)
         fields = {**result.fields, **line.fields}
         printed_unit = line.unit.format(**fields)
-        unit = paper.units.get(printed_unit, Unit(printed_unit))
+        unit = paper.units.get(printed_unit, Unit(si=printed_unit))
         if line.found:
             value = parse_number(line.found.format(**fields)) * unit.scale
             result = replace(result, value=value)

@@ -32,7 +32,7 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import BacktestVerdict
 from imubench_pipeline.navigation.backtest import windows
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
-from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
+from imubench_pipeline.navigation.error_budget.uncertainty import compute_limits, draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.simulate import channel_rng
@@ -134,7 +134,7 @@ def _compare(
     are missing; ``drawn``: models from the estimate; ``efficient``: see `_limit_mean_square`.
     """
     predicted = asked.sigma(model)
-    lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
+    lower, upper = compute_limits([asked.sigma(candidate) for candidate in drawn], predicted)
     covariance = windows.WindowCovariance(cut, asked.order, asked.factor)
     errors = windows.compute_window_errors(means, covariance.weights, covariance.lags)
     span, needed = asked.rest + asked.time, asked.duration_needed
@@ -143,9 +143,8 @@ def _compare(
         window=asked.rest,
         windows=errors.count,
         predicted=predicted,
-        # Draws of an absent term are above 0: extend the limits to the value.
-        predicted_lower=min(float(lower), predicted),
-        predicted_upper=max(float(upper), predicted),
+        predicted_lower=lower,
+        predicted_upper=upper,
         duration_needed=needed,
     )
     if errors.count <= (MIN_WINDOWS - 1) * cut.blocks:

@@ -6,7 +6,7 @@ log less the bias is integrated m + 1 times (`error_budget.growth`). Windows beg
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -67,10 +67,7 @@ class Window:
 
 
 def choose_window(rest: float, time: float, rate: float) -> Window | None:
-    """Return a window in blocks that divide both its parts as evenly as possible.
-
-    Its parts W and t are in s, the rate in Hz. None if the shorter part has no sample.
-    """
+    """Return a window whose blocks divide W and t, s, evenly; None if one has no sample."""
     shorter, longer = sorted((rest, time))
     # A rate that is estimated from time stamps may be slightly low.
     most = math.floor(1.001 * shorter * rate)
@@ -102,11 +99,7 @@ class Errors:
 
 
 def compute_window_errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
-    """Return the errors of all windows of a log.
-
-    ``means`` are the block means of each segment, NaN where one is missing; ``weights``, shape
-    (blocks,): weights of the blocks of a window; ``lags`` the number of lags for the pair counts.
-    """
+    """Return the errors of all windows, by block means of segments (NaN: missing) and weights."""
     total, count = 0.0, 0
     pairs = np.zeros(lags)
     for segment in means:
@@ -129,10 +122,7 @@ def compute_window_errors(means: Sequence[Array], weights: Array, lags: int) -> 
 
 
 def correlate(values: Array, weights: Array) -> Array:
-    """Return the correlation of values with weights at every full overlap.
-
-    Values have the shape (n,), weights (p,) with p <= n, and the result (n - p + 1,).
-    """
+    """Return the correlation of values (n,) with weights (p,) at full overlaps, (n - p + 1,)."""
     length = 1 << (len(values) - 1).bit_length()
     # The circular wrap-around affects only the part that is cut off.
     product = np.fft.rfft(values, length) * np.conj(np.fft.rfft(weights, length))
@@ -227,6 +217,7 @@ class WindowCovariance:
     order: int  # m: number of integrations minus one
     # multiplier of the errors: g if a gyro's attitude error projects gravity
     factor: float = 1.0
+    _unit_covariances: dict[Term, Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def weights(self) -> Array:
@@ -239,22 +230,17 @@ class WindowCovariance:
         return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
-        """Return the covariance of the errors by lag in blocks, without deterministic terms.
-
-        Shape (lags,), in rad^2, (m/s)^2 or m^2.
-        """
+        """Return the covariance of errors by lag in blocks, (lags,), SI^2, of noise only."""
         total = np.zeros(self.lags)
+        pairs = np.correlate(self.weights, self.weights, "full")  # from -(blocks - 1) to blocks - 1
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
         for term in model.terms:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
-                if unit not in self._unit_covariances:
-                    covariance = correlate(
-                        unit.block_covariance(lags, self.window.block), self._autocorrelation
-                    )
-                else:
-                    covariance = self._unit_covariances[unit]
+                covariance = self._unit_covariances.get(unit)
+                if covariance is None:
+                    covariance = correlate(unit.block_covariance(lags, self.window.block), pairs)
                 if unit is not term:  # all models share it
                     self._unit_covariances[unit] = covariance
                 total += power * covariance
@@ -290,12 +276,3 @@ class WindowCovariance:
                     coherence = mean_phasor**2
                 variance += 0.5 * power**2 * coherence
         return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
-
-    @cached_property
-    def _unit_covariances(self) -> dict[Term, Array]:
-        return {}
-
-    @cached_property
-    def _autocorrelation(self) -> Array:
-        """The autocorrelation of the weights, from -(blocks - 1) to blocks - 1."""
-        return np.correlate(self.weights, self.weights, "full")

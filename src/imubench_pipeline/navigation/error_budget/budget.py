@@ -16,13 +16,12 @@ All budgets here assume:
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from scipy.optimize import brentq
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.states import Measured
+from imubench_pipeline.model.states import MEASURED, Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, parts
 from imubench_pipeline.noise import NoiseModel
@@ -39,7 +38,6 @@ ACCEL_ORDER: dict[parts.Quantity, int] = {"velocity": 0, "position": 1}
 """Number of integrations minus one, m of `growth`."""
 
 
-_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
 _MIN_TIME = 1e-6
 _MAX_TIME = 1e9
 _CROSSING_POINTS = 4096
@@ -47,50 +45,24 @@ _CROSSING_POINTS = 4096
 
 
 @dataclass(frozen=True, kw_only=True)
-class Levelled:
-    """The initial tilt is found by the accelerometers: it is their mean error over g.
-
-    The mean is over the static window of the accelerometers, which must be calibrated. This tilt
-    cancels the mean error that caused it, so only the later departure from that mean has an effect
-    on velocity and position. A number that is negative or not finite raises a ValueError.
-    """
-
-    # turn-on bias of the accelerometer, 1 sigma, m/s^2; None: from the figures of the sensor, else
-    # left out of the attitude with a note
-    bias: float | None = None
-    on_time: float = 0.0  # time from switch-on to the beginning of the window, s
-
-    def __post_init__(self) -> None:
-        in_use.check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Start:
     """Initial conditions of dead reckoning.
 
-    A ValueError is raised if an angle is negative or not finite, or the tilt is levelled by
-    accelerometers that are not calibrated.
+    A levelled tilt is the mean error of the accelerometers over their static window, over g. It
+    cancels that error, so only the later departure from it has an effect on velocity and position.
     """
 
     gyro: SensorStart
     accel: SensorStart
-    # initial tilt: levelled by the accelerometers, or its 1 sigma, rad, if it has another source
-    # that is independent of the calibration of the accelerometers
-    tilt: Levelled | float = 0.0
+    # initial tilt: None: levelled by the accelerometers; or its 1 sigma, rad, if it has another
+    # source that is independent of the calibration of the accelerometers
+    tilt: float | None = 0.0
     heading: float = 0.0  # initial heading error, 1 sigma, rad
 
-    def __post_init__(self) -> None:
-        in_use.check_not_negative(heading=self.heading)
-        if not isinstance(self.tilt, Levelled):
-            in_use.check_not_negative(tilt=self.tilt)
-        elif not isinstance(self.accel, Calibrated):
-            raise ValueError("a levelled start needs the window of calibrated accelerometers")
-
     @classmethod
-    def calibrated(cls, window: float, *, tilt: Levelled | float | None = None) -> "Start":
-        """Return a start with both biases from one static window, s; levelled by default."""
-        sensor = Calibrated(window)
-        return cls(gyro=sensor, accel=sensor, tilt=Levelled() if tilt is None else tilt)
+    def calibrated(cls, window: float) -> "Start":
+        """Return a levelled start with both biases from one static window, s."""
+        return cls(gyro=Calibrated(window), accel=Calibrated(window), tilt=None)
 
 
 def budget(
@@ -115,7 +87,7 @@ def budget(
 
     The time t is in s. The gyro is across the axis, or for the heading points up; the accelerometer
     is along the axis, and the heading does not need it. The figures of these axes are other than
-    noise. Raise a ValueError if the quantity is not known, or the time is not above 0.
+    noise.
 
     References
     ----------
@@ -123,10 +95,6 @@ def budget(
     2nd ed., Artech House 2013; D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
     Technology", 2nd ed., IEE 2004.
     """
-    if quantity not in get_args(parts.Quantity):
-        raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(parts.Quantity)}")
-    if not (math.isfinite(time) and time > 0):
-        raise ValueError(f"time is {time}, expected a time above 0")
     order = GYRO_ORDER[quantity]
     factor = _get_factor(quantity, use)
     contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, factor))
@@ -136,23 +104,15 @@ def budget(
         heading = start.heading * (factor * time if quantity == "cross_track" else 1.0)
         source = ErrorSource("initial_heading")
         contributions.append(parts.Contribution(source, heading, in_use.STATED_FIGURE))
-    elif isinstance(start.tilt, Levelled):
-        if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            for term in accel.terms:
-                variance = term.mean_variance(start.accel.window, start.tilt.on_time)
-                sigma = math.sqrt(variance) / STANDARD_GRAVITY
-                contributions.append(
-                    parts.Contribution(parts.describe_term("accel", term, "initial_tilt"), sigma)
-                )
-            if start.tilt.bias is not None:
-                source = ErrorSource("turn_on_bias", "accel", "initial_tilt")
-                sigma = start.tilt.bias / STANDARD_GRAVITY
-                contributions.append(parts.Contribution(source, sigma, in_use.STATED_FIGURE))
-    else:
+    elif start.tilt is not None:
         tilt = start.tilt * factor * of_constant(order - 1, time)
-        contributions.append(
-            parts.Contribution(ErrorSource("initial_tilt"), tilt, in_use.STATED_FIGURE)
-        )
+        source = ErrorSource("initial_tilt")
+        contributions.append(parts.Contribution(source, tilt, in_use.STATED_FIGURE))
+    elif quantity == "attitude" and isinstance(start.accel, Calibrated):
+        for term in accel.terms:
+            sigma = math.sqrt(term.mean_variance(start.accel.window, 0.0)) / STANDARD_GRAVITY
+            source = parts.describe_term("accel", term, "initial_tilt")
+            contributions.append(parts.Contribution(source, sigma))
     for measured, (cause, lever, through) in _list_levers(quantity, time, start, use):
         figure = (gyro_figures if measured == "gyro" else accel_figures).get(cause)
         if figure is not None:
@@ -184,11 +144,11 @@ def _list_levers(
             "accel", ACCEL_ORDER[quantity], time, start.accel, use, direct=True
         )
         yield from (("accel", lever) for lever in levers)
-    levelled = isinstance(start.tilt, Levelled)
-    for measured in _QUANTITIES:
+    levelled = start.tilt is None
+    for measured in MEASURED:
         for lever in in_use.list_turn_levers(measured, quantity, time, use, levelled=levelled):
             yield measured, lever
-    if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
+    if quantity == "attitude" and levelled:
         yield "accel", ("turn_on_bias", 1.0 / STANDARD_GRAVITY, "initial_tilt")
         yield "accel", ("misalignment", 1.0, "initial_tilt")
 
@@ -222,10 +182,7 @@ def time_until(
     negative correlation. With lines or turns it may oscillate; if ``oscillates``, as with lines,
     the first crossing is found among 4096 times. The time is in s: 0 if the error exceeds the limit
     from the beginning, None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m.
-    Raise a ValueError if the limit is not above 0.
     """
-    if not (math.isfinite(limit) and limit > 0):
-        raise ValueError(f"limit is {limit}, expected a number above 0")
 
     def excess(time: float) -> float:
         return at(time).total - limit

@@ -28,7 +28,7 @@ _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 @dataclass(frozen=True, kw_only=True)
 class Gyrocompass:
-    """A horizontal gyro for north-finding; ValueError for a value out of its range."""
+    """A horizontal gyro for north-finding."""
 
     gyro: NoiseModel
     latitude: float  # rad, between the poles
@@ -43,24 +43,13 @@ class Gyrocompass:
     accel_figures: in_use.Figures = field(default_factory=dict)
     temperature_change: float = 0.0  # during the whole time, linear, K
 
-    def __post_init__(self) -> None:
-        if not abs(self.latitude) < math.pi / 2.0:
-            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        biases = {"bias": self.bias or 0.0, "accel_bias": self.accel_bias or 0.0}
-        in_use.check_not_negative(**biases, temperature=self.temperature_change)
-        if self.positions < 1 or (self.positions > 1 and self.positions % 2):
-            raise ValueError(f"positions is {self.positions}, expected 1 or an even number")
-
     def heading(self, time: float) -> Budget:
         """Return the heading error after a static window, s, by source, rad.
 
         At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
         n positions sigma^2(t/n) / n, with sigma^2 the Allan variance (Britting, "Inertial
-        Navigation Systems Analysis", Wiley 1971, for two). Raises a ValueError if the time is not
-        above 0.
+        Navigation Systems Analysis", Wiley 1971, for two).
         """
-        if not (math.isfinite(time) and time > 0):
-            raise ValueError(f"time is {time}, expected a time above 0")
         noise = self._list_noise_errors(time, swings=True)
         return Budget(time, "heading", [*noise, *self._list_figure_errors()])
 
@@ -68,12 +57,8 @@ class Gyrocompass:
         """Return the shortest static window, s, that gives a heading accuracy, 1 sigma, rad.
 
         The window is from 1 ms to 30 years; None if none is sufficient, because of turn-on bias,
-        flicker noise, walk or ramp. For lines, the envelope of their mean is used. Raises a
-        ValueError if the accuracy is not above 0.
+        flicker noise, walk or ramp. For lines, the envelope of their mean is used.
         """
-        if not (math.isfinite(accuracy) and accuracy > 0):
-            raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
-
         biases = [part.sigma for part in self._list_figure_errors()]
 
         def excess(logarithm: float) -> float:

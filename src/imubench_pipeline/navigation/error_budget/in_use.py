@@ -28,6 +28,7 @@ from pydantic import TypeAdapter
 from imubench_pipeline.datasheets.class_limits import STATEMENTS, find_limit, read_sigma
 from imubench_pipeline.datasheets.printed_noise import End
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause, Measured, Origin, SourcePath
 from imubench_pipeline.navigation.error_budget.turns import Turn
@@ -61,19 +62,9 @@ Figures = Mapping[Cause, Figure]
 NO_FIGURES: Figures = MappingProxyType({})
 
 
-def check_not_negative(**values: float) -> None:
-    """Raise a ValueError with the name of a number that is negative or not finite."""
-    for name, value in values.items():
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} is {value}, expected a number from 0")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Use:
-    """Motion and environment of a sensor in dead reckoning; 0 for none.
-
-    A ValueError is raised if a number is negative or not finite, or the time is not above 0.
-    """
+    """Motion and environment of a sensor in dead reckoning; 0 for none."""
 
     temperature_change: float = 0.0  # K
     turns: float = 0.0  # rad, about the vertical, and for the attitude about the axis of the gyro
@@ -82,13 +73,6 @@ class Use:
     vibration: float = 0.0  # rms, m/s^2
     vibration_frequency: float = 10.0  # its lowest frequency, Hz
     over: float = 1.0  # time during which temperature, heading and speed change evenly, s
-
-    def __post_init__(self) -> None:
-        for name in ("temperature_change", "turns", "speed_change", "speed", "vibration"):
-            check_not_negative(**{name: getattr(self, name)})
-        for name in ("over", "vibration_frequency"):
-            if not (math.isfinite(value := getattr(self, name)) and value > 0):
-                raise ValueError(f"{name} is {value}, expected a number above 0")
 
     @property
     def turn(self) -> Turn | None:
@@ -220,8 +204,6 @@ def list_turn_levers(
             yield from _list_scale_factors(abs(across), use, "turn")
             yield "g_sensitivity", speed * abs(across), "turn"
 
-
-SIGMAS = 1.96  # half the width of a 95 % interval
 
 _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
     "sensitivity": "temperature",

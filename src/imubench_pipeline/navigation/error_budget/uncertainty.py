@@ -6,24 +6,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
+from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter
 from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from imubench_pipeline.typing import Array
 
-_TAIL = (1.0 - 0.95) / 2.0  # share of the totals beyond each limit
 
-
-def compute_interval(budgets: Sequence[Budget]) -> tuple[float, float]:
-    """Return the 95 % limits of the total over budgets of drawn noise models, rad, m/s or m.
-
-    ``budgets`` are for one quantity and time, one a draw. Raises a ValueError without a budget, and
-    for budgets that differ in quantity or time.
-    """
-    if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
-        raise ValueError("expected budgets of one quantity at one time")
-    lower, upper = np.quantile([budget.total for budget in budgets], [_TAIL, 1.0 - _TAIL])
-    return float(lower), float(upper)
+def compute_limits(
+    drawn: Sequence[float] | Array, value: float, tail: float = 0.025
+) -> tuple[float, float]:
+    """Return 95 % limits of draws, extended to the value: draws of an absent term exceed it."""
+    lower, upper = np.quantile(drawn, [tail, 1.0 - tail]).tolist()
+    return min(lower, value), max(upper, value)
 
 
 def compute_chance_within(limit: float, budgets: Sequence[Budget]) -> float:

@@ -3,10 +3,11 @@
 `report/static/requirement.js` reads them. Noise models are drawn as for the table ``error_budget``.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
+
+import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.states import Cause
@@ -21,6 +22,7 @@ from imubench_pipeline.navigation.expected_errors import (
 )
 from imubench_pipeline.noise import GaussMarkov
 from imubench_pipeline.noise.growth import Calibrated
+from imubench_pipeline.noise.model import stack_models
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 
@@ -87,10 +89,7 @@ def pack_channels(
     seed: int,
     most: int | None = None,
 ) -> list[Packed]:
-    """Return the channels of a recording; the arguments are as of `list_error_rows`.
-
-    ``most`` is the maximum number of drawn models that are packed.
-    """
+    """Return the channels of a recording (see `list_error_rows`), with ``most`` draws at most."""
     packed = []
 
     def pack_figure(cause: Cause, every: Sequence[AxisErrors]) -> list[Any]:
@@ -115,23 +114,13 @@ def pack_channels(
 
 def _pack_terms(every: Sequence[AxisErrors]) -> list[list[Any]]:
     """Return symbol and parameters of each term over all models, 0 where one does not have it."""
-    columns: dict[tuple[str, int], list[list[float]]] = {}
-    for place, errors in enumerate(every):
-        times = Counter[str]()
-        for term in errors.model.terms:
-            key = term.symbol, times[term.symbol]
-            times[term.symbol] += 1
-            values = list(term.values.values())
-            missing = 1.0 if isinstance(term, GaussMarkov) else 0.0
-            empty = [[0.0] * len(every), *([[missing] * len(every)] * (len(values) - 1))]
-            for column, value in zip(
-                columns.setdefault(key, [list(one) for one in empty]), values, strict=True
-            ):
-                column[place] = value
-    return [
-        [symbol, *(_round(column) for column in parameters)]
-        for (symbol, _), parameters in columns.items()
-    ]
+    packed = []
+    for places, term in stack_models([errors.model for errors in every]):
+        values = np.zeros((len(term.parameters), len(every)))
+        values[1:] = 1.0 if isinstance(term, GaussMarkov) else 0.0
+        values[:, places] = list(term.values.values())
+        packed.append([term.symbol, *map(_round, values.tolist())])
+    return packed
 
 
 def _round(values: Iterable[float]) -> list[float]:

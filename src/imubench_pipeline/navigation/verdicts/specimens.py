@@ -65,12 +65,7 @@ class Expected:
 def predict_error(
     totals: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None = None
 ) -> Expected:
-    """Return the predicted error of the next specimen of a sensor.
-
-    The arguments are the rows ``total`` of the table ``error_budget`` for one limit, one a
-    recording; the specimen of each recording; and the spread of other sensors, used with one
-    specimen only.
-    """
+    """Return the predicted error of the next specimen from totals of a limit, one a recording."""
     figures = [
         (row, (row.sigma, row.lower, row.upper))
         for row in totals

@@ -60,22 +60,8 @@ class Standing:
         limit = self.total.limit
         return _divide(limit, self.expected.upper), _divide(limit, self.expected.lower)
 
-    @property
-    def noise_margin(self) -> float | None:
-        """Margin of the noise alone, of the representative recording."""
-        return self._scale_margin(self.total.noise)
-
-    @property
-    def likely_margin(self) -> float | None:
-        """Margin with the median of the class for figures that are not known."""
-        return self._scale_margin(self.total.likely)
-
-    @property
-    def best_margin(self) -> float | None:
-        """Margin with the best figures of the class for figures that are not known."""
-        return self._scale_margin(self.total.best)
-
-    def _scale_margin(self, sigma: float | None) -> float | None:
+    def scale_margin(self, sigma: float | None) -> float | None:
+        """Return the margin if the total of the representative recording were another."""
         if not self.known or sigma is None or not self.total.sigma:
             return None
         return self.margin * self.total.sigma / sigma if sigma > 0.0 else math.inf
@@ -99,7 +85,7 @@ class Standing:
             return "not_enough_data"
         if self.chance >= SURE_PROBABILITY:
             return "meets"
-        best = self.best_margin
+        best = self.scale_margin(self.total.best)
         if self.conditions and self.chance < 0.5 and best is not None and best >= 1.0:
             return "meets_if"
         if self.chance <= 1.0 - SURE_PROBABILITY:
@@ -116,11 +102,7 @@ def list_standings(
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
-    """Return the standing of one sensor for each limit of one requirement.
-
-    The arguments are rows of the table ``error_budget``, the specimen of each recording, and the
-    spread of other sensors by `make_limit_key`.
-    """
+    """Return the standing of one sensor for each limit; ``usual`` is by `make_limit_key`."""
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
         if row.source == "total":

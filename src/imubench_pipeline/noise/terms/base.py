@@ -3,10 +3,10 @@
 import inspect
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,28 +91,20 @@ class Reading:
     peak: bool = False  # the term is nowhere higher
 
 
-class SampleBlocks(Protocol):
-    """Blocks of samples of a log; b is their number."""
+@dataclass(frozen=True, kw_only=True)
+class SampleBlocks:
+    """Blocks of samples of a log; the arrays have the shape (b,)."""
 
-    @property
-    def rate(self) -> float:
-        """Sampling rate, Hz."""
-
-    @property
-    def start(self) -> NDArray[np.int64]:
-        """First sample of each block, shape (b,)."""
-
-    @property
-    def stop(self) -> NDArray[np.int64]:
-        """One-past-last sample of each block, shape (b,)."""
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of samples present in each block, shape (b,)."""
+    # start, stop: first sample of the log, and the one past the last
+    start: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    count: NDArray[np.int64]  # samples that are present
+    rate: float  # Hz
 
     @property
     def middle(self) -> Array:
-        """Mean time of each block, s from the first sample of the first block."""
+        """Mean time of the samples of each block, s from the first sample, shape (b,)."""
+        return np.asarray((0.5 * (self.start + self.stop - 1) - self.start[0]) / self.rate)
 
 
 @dataclass(frozen=True)
@@ -139,9 +131,6 @@ class Term(ABC):
     role: ClassVar[Role]
     parameters: ClassVar[tuple[TermParameter, ...]]
 
-    states: ClassVar[tuple[str, ...]]
-    """Names of the states of `state_space`."""
-
     @abstractmethod
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """Two-sided power spectral density in continuous time, SI^2/Hz."""
@@ -160,11 +149,7 @@ class Term(ABC):
 
     @abstractmethod
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Generalised covariance of the cumulative sum of the samples at whole lags, SI^2.
-
-        For second differences at n samples a cluster: a constant and a square of the lag may
-        differ.
-        """
+        """Covariance of sums of samples at lags, SI^2, up to a constant and a square of the lag."""
 
     @abstractmethod
     def state_space(self, interval: float) -> StateSpace:
@@ -187,9 +172,13 @@ class Term(ABC):
         s^(2m+2).
         """
 
-    @abstractmethod
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral from a known state; 0 if none."""
+        """Return the variances of its first and second integral from a known state.
+
+        0 by default: it does not grow, a filter with the term predicts it exactly, or there is no
+        finite state that could be known.
+        """
+        return np.zeros_like(time), np.zeros_like(time)
 
     @abstractmethod
     def block_covariance(self, lags: Array, block: float) -> Array:
@@ -258,15 +247,8 @@ class Term(ABC):
         yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over a window of length ``time``, (rad/s)^2 or (m/s^2)^2.
-
-        The window begins at ``on_time`` after switch-on, s.
-        """
+        """Return the variance of its mean over ``time`` from ``on_time`` since switch-on, s."""
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
-
-    def passed(self, power: Callable[[float], Array]) -> float:
-        """Return the part of its Allan variance that a low-pass passes, if it has no `drive`."""
-        return 1.0
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
         """Draw the first state, shape (m,)."""
@@ -281,10 +263,7 @@ class Deterministic(Term):
 
     @abstractmethod
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return the mean square and the frequency, Hz, of a weighted sum of adjacent block means.
-
-        ``block`` is the length of a block, s.
-        """
+        """Return mean square and frequency, Hz, of a weighted sum of means over blocks, s."""
 
     @property
     def drive(self) -> Drive | None:
@@ -299,10 +278,6 @@ class Deterministic(Term):
         """0: it has no variance."""
         return np.zeros_like(lags)
 
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return 0: a filter with the term predicts it exactly."""
-        return np.zeros_like(time), np.zeros_like(time)
-
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Raise TypeError: it is deterministic (see `swing`)."""
         raise TypeError(f"{self} is deterministic")
@@ -314,23 +289,23 @@ class Drives:
 
     white: float  # density N^2, SI^2/Hz
     flicker: float  # B^2 of flicker noise, SI^2
-    processes: tuple[Process, ...]  # Gauss-Markov processes
-    walks: tuple[Process, ...]  # random walks, whose correlation time is infinite
+    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
+    # processes, and then of random walks, whose time is infinite
+    times: Array
+    densities: Array
 
 
 def drives_of(terms: Iterable[Term]) -> Drives:
     """Return the joint input of terms to a filter; terms without a density are left out."""
     drives = [term.drive for term in terms if term.drive is not None]
-    processes = [drive.process for drive in drives if drive.process is not None]
-    return Drives(
-        sum(drive.white for drive in drives),
-        sum(drive.flicker**2 for drive in drives),
-        tuple(process for process in processes if math.isfinite(process.T_B)),
-        tuple(process for process in processes if math.isinf(process.T_B)),
-    )
+    slow = [(each.process.T_B, each.process.density) for each in drives if each.process is not None]
+    slow.sort(key=lambda part: math.isinf(part[0]))
+    times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
+    white, flicker = sum(each.white for each in drives), sum(each.flicker**2 for each in drives)
+    return Drives(white, flicker, times, densities)
 
 
-_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
+_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters")
 """Class variables that every kind must define."""
 
 

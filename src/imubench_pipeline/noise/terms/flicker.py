@@ -48,10 +48,7 @@ _MAX_EXACT_SIZE = 1 << 12  # largest cluster with an exact sum for the Allan var
 
 @dataclass(frozen=True)
 class Flicker(Term):
-    """Flicker noise, 1/f: bias instability B as IEEE Std 952 defines it.
-
-    It has no finite state space; `fit_flicker_bank` approximates it.
-    """
+    """Flicker noise, 1/f, with B as in IEEE Std 952; `fit_flicker_bank` has finite states."""
 
     B: float
     symbol = "F"
@@ -60,7 +57,6 @@ class Flicker(Term):
     word = "flicker"
     role = Role.SLOW
     parameters = (gauss_markov.BIAS_INSTABILITY,)
-    states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """B^2 / (2 pi f)."""
@@ -115,21 +111,11 @@ class Flicker(Term):
         return self.B**2, Flicker(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """B^2 t^(2m+2) times a function of the window, or the time since switch-on, over t.
-
-        See `integrate_after_window` and `integrate_since_switch_on`.
-        """
+        """B^2 t^(2m+2) times `integrate_after_window` or `integrate_since_switch_on`."""
         scale = self.B**2 * time ** (2 * order + 2)
         if isinstance(start, Calibrated):
             return scale * integrate_after_window(order, start.window / time)
         return scale * integrate_since_switch_on(order, start.on_time / time)
-
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: flicker noise has no finite state that could be known.
-
-        A filter predicts with the `fit_flicker_bank`, see `realised`.
-        """
-        return np.zeros_like(time), np.zeros_like(time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """-(B^2 / pi) times the second difference of k^2 (ln k - 3/2) / 2."""

@@ -12,7 +12,6 @@ from imubench_pipeline.noise.growth import (
     SensorStart,
     Uncalibrated,
     of_constant,
-    of_walk,
     of_white,
     of_white_mean,
 )
@@ -32,7 +31,6 @@ class Quantization(base.Term):
     word = "Q"
     role = base.Role.NOT_GROWING
     parameters = (base.TermParameter("Q", "quantization", 1.0, 1.0),)
-    states = ("z_Q", "z_Q before")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """(4 Q^2 / T) sin^2(pi f T): it depends on the sampling; ValueError without an interval."""
@@ -84,10 +82,6 @@ class Quantization(base.Term):
         mean = of_constant(order, time) / start.window if isinstance(start, Calibrated) else 0.0
         return self.Q**2 * (last + (first + mean) ** 2 + mean**2)
 
-    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: it does not grow."""
-        return np.zeros_like(time), np.zeros_like(time)
-
     def block_covariance(self, lags: Array, block: float) -> Array:
         """2 Q^2 / d^2 at k = 0 and -Q^2 / d^2 at 1."""
         return self.Q**2 / block**2 * (2.0 * (lags == 0.0) - (lags == 1.0))
@@ -119,7 +113,6 @@ class WhiteNoise(base.Term):
     word = "N"
     role = base.Role.WHITE
     parameters = (base.TermParameter("N", "noise density", 1.0, 0.5),)
-    states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """N^2."""
@@ -203,7 +196,6 @@ class RandomWalk(base.Term):
     word = "K"
     role = base.Role.RANDOM_WALK
     parameters = (base.TermParameter("K", "random walk", 1.0, -0.5),)
-    states = ("z_K",)
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """K^2 / (2 pi f)^2."""
@@ -246,7 +238,7 @@ class RandomWalk(base.Term):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3), A in the place of W/3 uncalibrated."""
         lag = start.window / 3.0 if isinstance(start, Calibrated) else start.on_time
-        return self.K**2 * (of_walk(order, time) + of_constant(order, time) ** 2 * lag)
+        return self.K**2 * (of_white(order + 1, time) + of_constant(order, time) ** 2 * lag)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """K^2 t^3 / 3 and K^2 t^5 / 20."""
@@ -291,7 +283,6 @@ class Ramp(base.Deterministic):
     word = "R"
     role = base.Role.SLOW
     parameters = (base.TermParameter("R", "ramp", 1.0, -1.0, signed=True),)
-    states = ("z_R", "z_R slope")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """R^2 / (2 pi f)^3, as IEEE Std 952 assigns it; a ramp has no density proper."""

@@ -1,7 +1,6 @@
 """A line: a sinusoid in the signal."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,6 @@ class Sinusoid(Deterministic):
         TermParameter("amplitude", "amplitude", 1.0, 0.0),
         TermParameter("frequency", "frequency", 0.0, -1.0),
     )
-    states = ("z_S", "z_S quadrature")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """0: the power amplitude^2 / 2 of a line has no density."""
@@ -113,10 +111,6 @@ class Sinusoid(Deterministic):
         middle = np.arange(len(weights)) + 0.5
         seen = np.sinc(self.frequency * block) * (weights @ np.exp(1j * turn * middle))
         return 0.5 * float(abs(self.amplitude * seen)) ** 2, self.frequency
-
-    def passed(self, power: Callable[[float], Array]) -> float:
-        """Return the squared gain at its frequency."""
-        return float(power(self.frequency))
 
     @property
     def in_words(self) -> str:

@@ -97,6 +97,7 @@ def lay_out(
 
 
 def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
+    """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
     if not sensor.is_file():
         named = list_files(catalogue, "sensor").get(str(sensor))
         if named is None:
@@ -182,12 +183,10 @@ def _is_same_unit(unit: str, other: str, channel: str) -> bool:
 def inspect_log(log: Path, topics: Sequence[str] = (), model: str | None = None) -> Inspection:
     """Return what a log holds, within bounds of time and memory; ConfigError if it cannot be read.
 
-    ``topics`` of a bag; none: all. ``model``: its sensor in the draft; None: by the log.
+    ``topics`` of a bag; none: all. ``model``: name of the sensor; None: the name of the log.
     """
     try:
-        inspected: Inspection = run_bounded(
-            INSPECTED_S, INSPECTED_BYTES, inspect, log, model, topics
-        )
+        return run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log, model, topics)
     except BoundError as error:
         raise ConfigError(
             f"{log.name}: to list it {error}; expected the log of an inertial sensor: copy what it "
@@ -195,4 +194,3 @@ def inspect_log(log: Path, topics: Sequence[str] = (), model: str | None = None)
         ) from None
     except (RecordingError, OSError) as error:
         raise ConfigError(str(error)) from None
-    return inspected

@@ -51,11 +51,6 @@ def recordings_differ(*, of_devices: bool) -> str:
     return f"the recordings differ: {devices}the sensor is not stationary"
 
 
-def devices_compared(p_value: float, *, differ: bool) -> str:
-    than = "more than" if differ else "no more than"
-    return f"devices differ {than} repeated recordings (p = {number_text(p_value, 2)})"
-
-
 def status_reason(status: Status, reason: str | None) -> str:
     words = STATUS_WORDS[status]
     return f"{words}: {reason}" if reason else words

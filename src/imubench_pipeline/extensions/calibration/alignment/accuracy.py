@@ -14,8 +14,8 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
 from imubench_pipeline.extensions.calibration.alignment.coarse import (
-    coarse_accuracy,
     coarse_alignment,
+    coarse_sigma,
     mean_vectors,
 )
 from imubench_pipeline.extensions.calibration.alignment.fine import (
@@ -79,7 +79,6 @@ class Accuracy:
     time: float  # s
     sigma: Array  # shape (3,); of roll, pitch and heading, rad
     errors: Array | None = None  # shape (3,); rms of simulated errors over ``sigma``
-    simulated: int = 0  # number of simulated triads
 
     @property
     def reason(self) -> str | None:
@@ -122,8 +121,8 @@ def accuracies(
                 positions = Positions.turned_about_z(
                     [0.0, math.pi], dwell=dwell, turning=turning, block=block, rate=rate
                 )
-            coarse = coarse_accuracy(triad, positions, site, _LEVEL_ATTITUDE)
-            yield Accuracy(number, "coarse", time, coarse.sigma)
+            coarse = coarse_sigma(triad, positions, site, _LEVEL_ATTITUDE)
+            yield Accuracy(number, "coarse", time, coarse)
             fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
             errors = None
             if runs and rng is not None and time == times[-1]:
@@ -139,6 +138,4 @@ def accuracies(
                     errors = np.sqrt(np.mean(fine.run(drawn).psi[:, -1] ** 2, axis=0)) / sigma
                     known = [True, True, sigma[2] < UNIFORM_HEADING_SIGMA]
                     errors = np.where(known, errors, math.nan)
-            yield Accuracy(
-                number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
-            )
+            yield Accuracy(number, "fine", time, fine.sigma[-1], errors)
