@@ -252,8 +252,6 @@ class Plan:
 
     def _experiment(self, sensor: str, name: str) -> str | None:
         """Return the key of the experiment of a recording; None: the sensor was at rest."""
-        if (kind := self.kind(sensor, name)) != AT_REST:
-            return kind
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return next(iter(stated_experiments(self.simulated[sensor, name])), None)

@@ -81,8 +81,8 @@ def _plain(value: Any) -> Any:
     """Convert a value for Arrow: texts become printable, structs mappings, NaN and inf None."""
     if isinstance(value, str):  # a reason may have several lines
         return "\n".join(map(escape_invisible, value.split("\n")))
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
     if isinstance(value, (tuple, list)):
         return [_plain(part) for part in value]
     if is_dataclass(value) and not isinstance(value, type):
