@@ -225,14 +225,16 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
 def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]:
     first = event.findings[0]
     text = events_text(event.findings, system, event.factors())
-    text = text if len(event.findings) == 1 else text.removeprefix(_axes_prefix(event))
+    where = channels_text(event.channels)
+    if where and len(event.findings) > 1:
+        text = text.removeprefix(f"{where[:1].upper()}{where[1:]}. ")
     spans = [(row.start, row.start if row.end is None else row.end)
              for row in event.findings if row.start is not None]  # fmt: skip
     return {
         "number": number,
         "finding": first.finding,
         "matters": event.score() > 0.0 and first.severity != "note",
-        "channel": channels_text(event.channels),
+        "channel": where,
         "linked": False,
         "short": re.split(r"(?<=\D[.;:]) ", numbers.sentence(text), maxsplit=1)[0].rstrip(":;.")
         + ".",
@@ -241,11 +243,6 @@ def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]
         "start": min((start for start, _ in spans), default=None),
         "end": max((end for _, end in spans), default=None),
     }
-
-
-def _axes_prefix(event: Event) -> str:
-    where = channels_text(event.channels)
-    return f"{where[:1].upper()}{where[1:]}. " if where else ""
 
 
 def _tabulate_recommended(quantity: str, channels: Sequence[dict[str, Any]]) -> dict[str, Any]:
