@@ -389,16 +389,12 @@ def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
     for ranking in format_rankings(rows, site.settings["requirements"], simulated, site.system):
         groups = ranking.groups
         ranked = [group for group in groups if group.row.rank]
-        marked = {g.sensor: f"{site.names[g.sensor]} (simulated)" for g in ranked if g.simulated}
-        excluded = sum(group.row.verdict == "excluded" for group in groups)
         yield {
             "name": ranking.name,
             "requirement": ranking.requirement,
             "groups": groups,
             "asked": verdicts.requirement_text(ranking.requirement),
-            "answer": verdicts.answer_text(
-                [group.row for group in ranked], site.names | marked, len(groups), excluded
-            ),
+            "answer": _answer(site, groups, ranked),
             "details": list(_details(site, groups, ranked)),
             "tied": {group.sensor: _name_tied(site, group) for group in groups},
         }
@@ -406,6 +402,13 @@ def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
 
 def _name_tied(site: Site, group: Group) -> list[str]:
     return [site.names.get(name, name) for name in group.row.tied_with]
+
+
+def _answer(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> str:
+    marked = {g.sensor: f"{site.names[g.sensor]} (simulated)" for g in ranked if g.simulated}
+    excluded = sum(group.row.verdict == "excluded" for group in groups)
+    rows = [group.row for group in ranked]
+    return verdicts.answer_text(rows, {**site.names, **marked}, len(groups), excluded)
 
 
 def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> Iterator[str]:
