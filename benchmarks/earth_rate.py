@@ -116,9 +116,9 @@ class Moments:
 def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: slice) -> Tally:
     """Return what filter and pairs do in simulated runs."""
     blocks = one.blocks
-    freedoms = {"NEES": len(one.names) + 1, "NEES of the rate": 1, "NIS": 1}
+    freedoms = {"NEES": count_states(one) + 1, "NEES of the rate": 1, "NIS": 1}
     epochs = len(blocks.start[after])
-    at_once = max(PART // (len(blocks) * (len(one.names) + 2)), 1)
+    at_once = max(PART // (len(blocks) * (count_states(one) + 2)), 1)
     inside = {name: np.zeros(epochs) for name in freedoms}
     mean = {name: np.zeros(epochs) for name in freedoms}
     errors = {name: Moments() for name in ("filter", "pairs", "A-B-A", "drift")}
@@ -138,8 +138,8 @@ def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: sli
             errors["filter"].add(found.rate - EARTH_RATE)
             errors["pairs"].add(by_pairs(means, blocks, model).rate - EARTH_RATE)
             errors["A-B-A"].add(by_triples(means, blocks, model).rate - EARTH_RATE)
-            smoothed = one.smooth(found)
-            errors["drift"].add((smoothed.drift - drawn.drift[part]) / smoothed.drift_sigma)
+            drift, sigma = one.smooth(found)
+            errors["drift"].add((drift - drawn.drift[part]) / sigma)
     total = CHUNK * -(-runs // CHUNK)
     return Tally(
         total,
@@ -150,6 +150,11 @@ def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: sli
             for name, one in errors.items()
         },
     )
+
+
+def count_states(one: RateFilter) -> int:
+    """Return the number of states of the gyro's error."""
+    return one.run(np.zeros((1, len(one.blocks)))).states.shape[2] - 2
 
 
 def of_part(found: Filtered, states: Array) -> dict[str, Array]:
@@ -175,7 +180,7 @@ def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterato
     print(
         f"\n{name}: {model.name}, {tally.runs} runs of {given.minutes:g} min, {len(design.dwells)} "
         f"dwells, {len(blocks)} blocks of up to {longest / PAPER_RATE:.3g} s, "
-        f"{len(one.names)} states"
+        f"{count_states(one)} states"
     )
     for what, part in tally.inside.items():
         text = (
@@ -315,20 +320,22 @@ def outlook() -> None:
     one = Outlook(PAPER_MODEL, ASSUMED_LATITUDE, ASSUMED_TURNING, PAPER_RATE)
     for relative in (1.0, 0.1, 0.01):
         turns = one.turns_needed(28.0, relative)
-        hours = one.time_needed(28.0, relative) / 3600.0
+        assert turns is not None
+        hours = one.run_time(28.0, turns) / 3600.0
         print(
             f"  {100 * relative:3.0f} % of the rate: {turns} turns, dwells of 28 s, {hours:.3f} h"
         )
     for minutes in (10.0, 60.0):
         curve = one.over_dwell(60.0 * minutes)
         best = curve.best
+        near = curve.dwell[curve.nearly_best]
         least, of_one_turn = (math.degrees(curve.sigma[place]) for place in (best, 0))
         print(
             f"  best dwell in {minutes:g} min: {curve.dwell[best]:.1f} s ({curve.dwells[best]} "
             f"dwells), sigma {least:.6f} deg/s; with one turn {of_one_turn:.6f}; within 1 % of the "
-            f"best from {curve.nearly_best()[0]:.1f} to {curve.nearly_best()[1]:.1f} s"
+            f"best from {near.min():.1f} to {near.max():.1f} s"
         )
-    heading = one.heading(28.0, 119)
+    heading = one.sigmas_after(28.0, 119) / EARTH_RATE
     print(
         f"  heading by gyrocompassing: {math.degrees(heading[0]):.1f} deg after one turn, "
         f"{math.degrees(heading[-1]):.1f} deg after 1 h"

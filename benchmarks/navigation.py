@@ -39,7 +39,6 @@ from imubench_pipeline.extensions.aided.plan import dump_navigate_settings
 from imubench_pipeline.extensions.aided.runs import (
     FIX_INTERVAL,
     Drive,
-    Outage,
     compute_mean_squares,
     compute_nees_share,
     compute_root_mean_square,
@@ -201,13 +200,11 @@ def of_budget(runs: int) -> int:
     )
     print("|---" * 7 + "|")
     for length in LENGTHS:
-        drive = Drive(simulate_trajectory("rest", begin + length, RATE), [Outage(begin, length)])
+        drive = Drive(simulate_trajectory("rest", begin + length, RATE), [(begin, length)])
         outcome = drive.repeat(
             {"true": states(noise)}, partial(of_run, drive, noise, "rest"), runs, CORES
         )["true"]
-        size = compute_root_mean_square(
-            compute_mean_squares(drive, outcome, "position", length)
-        ).value
+        size = compute_root_mean_square(compute_mean_squares(drive, outcome, "position", length))[0]
         expected = math.sqrt(float(np.mean(outcome.variances[:, -1, :2].sum(axis=1))))
         started = predicted_by_filter(drive, noise, begin, length)
         window = (

@@ -32,8 +32,12 @@ from scipy.linalg import block_diag
 from bands import highest, what_is_cut
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.extensions.exports.growth import growth
-from imubench_pipeline.extensions.exports.overbound import Family, overbound, simultaneous_upper
+from imubench_pipeline.extensions.exports.overbound import (
+    Family,
+    growth,
+    overbound,
+    simultaneous_upper,
+)
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -117,7 +121,7 @@ def scores(case: Case, model: NoiseModel, longest: float, horizon: float) -> Sco
     density = model.psd(frequency) / case.model.psd(frequency)
     time = np.geomspace(1.0 / case.rate, horizon, 100)
     true, own = growth(case.model, time, case.rate), growth(model, time, case.rate)
-    grown = np.minimum(own.first / true.first, own.second / true.second)
+    grown = np.minimum(own[0] / true[0], own[1] / true[1])
     honest = confidence_of(model, case.model, case.rate, horizon)
     lowest = float(ratio[np.argmin(truth)])
     return (

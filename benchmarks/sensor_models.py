@@ -14,7 +14,7 @@ import argparse
 import math
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,6 @@ from scipy.stats import binomtest
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_estimate
-from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
@@ -110,6 +109,29 @@ class Case:
     def truth(self) -> Array:
         """Return the true temperature at every sample, °C."""
         return self.temperature(np.arange(self.samples) / self.rate)
+
+
+def allan_of_spectrum(
+    spectrum: Callable[[Array], NDArray[Any]], sizes: NDArray[np.int64]
+) -> NDArray[Any]:
+    """Return the Allan variance, shape (m,), of samples of a spectrum that takes rad per sample.
+
+    (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n sin(w/2))^2 dw, by Gauss-Legendre: in octaves up to the
+    first zero of the response to clusters of n samples, then in its periods.
+    """
+    points, weights = np.polynomial.legendre.leggauss(16)
+    variances = []
+    for n in sizes.tolist():
+        end = n * np.pi / 2.0
+        first = min(np.pi, end)
+        edges = np.append(first * 2.0 ** np.arange(-40.0, 1.0), np.arange(2, n // 2 + 1) * np.pi)
+        edges = np.append(edges[edges < end], end)
+        middle, half = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges) / 2.0
+        x = (middle[:, None] + half[:, None] * points).ravel()
+        w = 2.0 * x / n
+        response = 4.0 / np.pi * np.sin(x) ** 4 / (n * np.sin(w / 2.0)) ** 2 / n
+        variances.append((np.outer(half, weights).ravel() * response) @ spectrum(w))
+    return np.array(variances)
 
 
 def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:

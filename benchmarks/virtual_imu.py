@@ -3,14 +3,12 @@
     python benchmarks/virtual_imu.py [--logs 20] [--hours 1]
 
 A line a board and way of fusing: the predicted Allan deviation over the measured one (mean of the
-logs) at some tau, and how often the 95 % limits of the measured curve hold the prediction. Below:
-what the causal filter loses against the best weights at each frequency.
+logs) at some tau, and how often the 95 % limits of the measured curve hold the prediction.
 """
 
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,10 +16,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes
 from imubench_pipeline.extensions.fusion.board import Board, Shared
-from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
-from imubench_pipeline.extensions.fusion.samples import fuse
-from imubench_pipeline.extensions.fusion.weights import ByFrequency, Constant, best_constant, equal
+from imubench_pipeline.extensions.fusion.weights import best_constant, equal, fuse
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -70,30 +66,16 @@ def main() -> None:
     shown = np.array([np.argmin(np.abs(np.log(sizes / RATE / tau))) for tau in SHOWN])
     tau = "  ".join(f"{size / RATE:8.3g}" for size in sizes[shown])
     print(f"{'predicted / measured at tau of, s':34s} {tau}   inside  common at the end")
-    losses = []
-    spent, fused = 0.0, 0
     hits, points = 0.0, 0
     for name, board in boards():
-        kalman = KalmanFusion(board)
-        ways: dict[str, Constant | KalmanFusion] = {
-            "equal": equal(board.sensors),
-            "10 s": best_constant(board, 10.0),
-            "Kalman": kalman,
-        }
-        best = fused_allan(board, ByFrequency(board), sizes / RATE).deviation
-        losses.append((name, fused_allan(board, kalman, sizes / RATE).deviation / best))
+        ways = {"equal": equal(board.sensors), "10 s": best_constant(board, 10.0)}
         variances = {way: np.zeros(len(sizes)) for way in ways}
         inside = {way: np.zeros(len(sizes)) for way in ways}
         predicted = {way: fused_allan(board, how, sizes / RATE) for way, how in ways.items()}
         for seed in range(given.logs):
             logs = logs_of(board, samples, seed)
             for way, how in ways.items():
-                began = time.process_time()
-                log = fuse(board, how, logs)
-                if how is kalman and seed:  # the first compiles
-                    spent += time.process_time() - began
-                    fused += len(log) * board.sensors
-                curve = allan_variance(log, RATE, cluster_sizes=sizes)
+                curve = allan_variance(fuse(board, how, logs), RATE, cluster_sizes=sizes)
                 lower, upper = curve.limits(0.95)
                 expected = predicted[way].deviation
                 inside[way] += (lower < expected) & (expected < upper)
@@ -106,12 +88,6 @@ def main() -> None:
             end = predicted[way].common_share[-1]
             print(f"{name:18s} {way:15s} {text}   {held:6.1%}  {end:6.1%}")
     print(f"\nall: {hits / points:.1%} of {points} points of curves hold the prediction (95 %)")
-    if fused:
-        print(f"Kalman filter: {1e9 * spent / fused:.0f} ns of CPU a sample of a sensor")
-    print(f"\n{'Kalman / best by frequency':34s} {tau}   most")
-    for name, loss in losses:
-        text = "  ".join(f"{value:8.4f}" for value in loss[shown])
-        print(f"{name:34s} {text} {loss.max():8.4f}")
 
 
 if __name__ == "__main__":

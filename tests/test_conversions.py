@@ -1,4 +1,4 @@
-"""Values computed by hand, from papers and from data sheets that print a figure in two ways."""
+"""Values computed by hand, from papers and from datasheets that print a figure in two ways."""
 
 import math
 

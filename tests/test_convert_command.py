@@ -1,4 +1,4 @@
-"""Figures of data sheets, converted in the shell."""
+"""Figures of datasheets, converted in the shell."""
 
 import math
 

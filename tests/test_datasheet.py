@@ -60,7 +60,7 @@ def test_table_4_of_the_first_paper_both_ways() -> None:
     assert one.comparable == pytest.approx(8.64e-5, rel=1e-3)
     assert one.delta == pytest.approx(-0.03, abs=0.005)
     assert one.verdict == "as printed"
-    assert "assumed, as the data sheet does not state it" in "; ".join(one.reasons)
+    assert "assumed, as the datasheet does not state it" in "; ".join(one.reasons)
 
 
 def test_the_accelerometer_of_the_same_table() -> None:

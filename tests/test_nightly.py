@@ -91,7 +91,7 @@ def test_the_lock_holds_while_snakemake_lives_and_its_note_stays(tmp_path: Path)
         assert holder.stdout
         child = psutil.Process(int(holder.stdout.readline()))
         holder.kill()
-    with pytest.raises(TakenError, match=rf"process {holder.pid} is gone, but .*{child.pid}"):
+    with pytest.raises(TakenError, match=rf"process {holder.pid} .*is gone, but .*{child.pid}"):
         Lock(path).acquire()
     child.kill()
     for _ in range(2):  # who does not put it right leaves it to the next
@@ -455,7 +455,7 @@ def test_at_the_first_run_all_is_new(tmp_path: Path) -> None:
     assert [one.finding for one in found.warnings] == ["knocks"]
     assert [(one.recording, one.new) for one in found.rejected] == [("s/b", True)]
     assert len(found.drift) == 1
-    assert found.first[0].said == "robot: s meets the limits. Only sensor with usable data."
+    assert found.answers[0] == "robot: s meets the limits. Only sensor with usable data."
 
 
 def test_what_is_known_is_fine(tmp_path: Path) -> None:
@@ -473,7 +473,7 @@ def test_what_is_known_is_fine(tmp_path: Path) -> None:
     found = summary(compare_states(read_state(tmp_path / "state.json"), after, tables, []))
     assert STATUS[found.outcome] == 0
     assert [(one.recording, one.new) for one in found.rejected] == [("s/b", False)]
-    assert not (found.new or found.changed or found.removed or found.warnings or found.first)
+    assert not (found.new or found.changed or found.removed or found.warnings or found.answers)
     assert "rejected (none of them new):\n  s/b: empty\n" in format_summary(found)
 
 
@@ -502,7 +502,6 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
     text = format_summary(found)
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
     assert "robot: No sensor meets the limits. u is closest, but fails." in text
-    assert " (before: s)\n" in text
 
 
 def test_another_version_is_told_from_another_sensor(tmp_path: Path) -> None:
@@ -530,15 +529,14 @@ def test_another_version_is_told_from_another_sensor(tmp_path: Path) -> None:
         "s/a": ("the program changed from version 1.0 to 1.1", False),
         "s/b": ("its log changed", True),
     }
-    assert [(each.recording, each.reanalysed) for each in changes.drift] == [
-        ("a", True), ("b", False)
-    ]  # fmt: skip
+    assert [each.recording for each in changes.drift] == ["a", "b"]
     changes.reanalysis += describe_reanalysis(old, new, {"s/a"})
     text = format_summary(summary(changes))
     assert "changed by the analysis, with the same logs:\n" in text
     assert "Values changed beyond their intervals: 1, by a factor of up to 2\n" in text
     assert "s/a gyro_x N: 0.34 °/√h (0.31 to 0.38), now 0.69 °/√h (0.62 to 0.76) (2 times)" in text
-    assert text.count("the analysis may be the cause") == 1
+    (line,) = (line for line in text.splitlines() if "the analysis may be the cause" in line)
+    assert " in a" in line
 
 
 @pytest.mark.parametrize(
@@ -576,7 +574,7 @@ def test_of_a_log_written_to_during_the_run_nothing_is_said_yet(tmp_path: Path) 
     assert not (found.new or found.changed or found.rejected or found.warnings)
     kept = after.without(["s/a", "s/b"], before)
     assert kept.recordings == before.recordings
-    assert kept.warned == [] and kept.logs == {}
+    assert not any(known.warned for known in kept.recordings.values()) and kept.logs == {}
 
 
 @pytest.mark.parametrize(
@@ -599,7 +597,7 @@ def test_long_lists_end_with_how_many_more() -> None:
 def test_a_failed_run_says_why() -> None:
     text = format_summary(summary({"outcome": "failed", "failure": ["Error\x1b[31m in rule"]}))
     assert "why it failed:\n  Error [31m in rule\n" in text
-    assert "took 1 min 1 s" in text
+    assert "took 61 s" in text
 
 
 # Settings

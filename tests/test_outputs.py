@@ -369,7 +369,6 @@ def test_an_earlier_report_is_replaced_and_nothing_beside_it(
         ("simulate bno055 --duration 1s --out x.csv", "--temperature", ["1e308 degC", "-300 degC"]),
         ("export results --sensor imu --target json", "--horizon", ["nan", "-1", "1e308 s", "0"]),
         ("export results --sensor imu --target json", "--inflate", ["nan", "-1", "1e308", "inf"]),
-        ("export results --sensor imu --target json", "--latitude", ["nan", "91", "1e308"]),
         ("export results --sensor imu --target json", "--rate", ["nan", "-1", "0", "inf"]),
         ("export results --sensor imu --target json", "--excess", ["nan", "-1", "inf", ""]),
         ("show results", "--width", ["-1", "nan", "1" + "0" * 20, ""]),

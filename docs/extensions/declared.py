@@ -106,7 +106,7 @@ def which_numbers() -> str:
     heads = ("number in the file", "of", "value", "unit", "convention")
     sections = []
     for target in TARGETS.values():
-        if not target.declared.entries:
+        if not target.entries:
             continue
         rows = (
             (
@@ -116,13 +116,13 @@ def which_numbers() -> str:
                 code(entry.unit),
                 cell(entry.form.convention),
             )
-            for entry in target.declared.entries
+            for entry in target.entries
         )
         about = (
             f"`imubench export --target {target.name}` writes `{target.file_name}`, with terms "
-            f"{target.family}. [Source]({target.declared.source})"
+            f"{target.family}. [Source]({target.source})"
         )
-        sections.append(f"## {target.program}\n\n{about}\n\n{table(heads, rows)}")
+        sections.append(f"## {target.title}\n\n{about}\n\n{table(heads, rows)}")
     return "\n".join(sections)
 
 

@@ -12,7 +12,6 @@ from imubench_pipeline.extensions.aided.runs import (
     INITIAL_TILT_SIGMA,
     WARM_UP,
     Drive,
-    Outage,
     Outcome,
     schedule_outages,
 )
@@ -21,10 +20,10 @@ from imubench_pipeline.extensions.aided.trajectories import (
     Signals,
     Spreads,
     Trajectory,
-    compute_headings,
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -122,13 +121,15 @@ def plain_variances(drive: Drive, axes: list[AxisStates]) -> np.ndarray:
 )
 def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel) -> None:
     way = simulate_trajectory("drone", 12.0, 50.0)
-    drive = Drive(way, [Outage(5.0, 5.0)])
+    drive = Drive(way, [(5.0, 5.0)])
     axes = tuned(gyro, ACCEL, 50.0, scale=3e-3)
     ideal = Signals(
         way.rate,
         way.force,
         np.column_stack([
-            way.position[drive.at], way.velocity[drive.at], compute_headings(way.attitude[drive.at])
+            way.position[drive.at],
+            way.velocity[drive.at],
+            euler_angles(way.attitude[drive.at])[:, 2],
         ]),
         np.full((len(drive.at), 6), np.nan),
         np.zeros(9),
@@ -150,7 +151,7 @@ def outcomes(request: pytest.FixtureRequest) -> dict:
     def of_run(number: int) -> Signals:
         return simulate_signals(way, axes, SPREADS, 100, 7, ("car", str(number)))
 
-    assert [outage.length for outage in drive.outages].count(60.0) == 2
+    assert len(drive.of_outages(60.0)) == 2
     found = drive.repeat(tunings, of_run, request.param, threads=2)
     return {"drive": drive, "runs": request.param, **found}
 

@@ -15,7 +15,7 @@ from imubench_pipeline.extensions.aided.axis_states import (
     add_turn_on_bias,
     make_axis_states,
 )
-from imubench_pipeline.extensions.aided.runs import Drive, Outage
+from imubench_pipeline.extensions.aided.runs import Drive
 from imubench_pipeline.extensions.aided.trajectories import (
     Spreads,
     simulate_signals,
@@ -39,7 +39,7 @@ FLICKER = {"gyro": NoiseModel(N=8.4e-5, B=6.7e-5), "accel": NoiseModel(N=9.6e-4,
 PAPERS = {"gyro": GYRO, "accel": ACCEL}
 SPREADS = Spreads(1e-3, 0.02)
 WAY = simulate_trajectory("car", 100.0, RATE)
-DRIVE = Drive(WAY, [Outage(60.0, 30.0)])
+DRIVE = Drive(WAY, [(60.0, 30.0)])
 SIGNALS = simulate_signals(
     WAY,
     {c: SensorModel(noise=PAPERS[c.split("_")[0]]) for c in CHANNELS},
@@ -60,12 +60,6 @@ def of_json(content: Any, name: str) -> StateSpace:
     found = json.loads(content)[name]["discrete"]
     Phi, Q_d, H, x0, P0 = (np.array(found[key]) for key in ("Phi", "Q_d", "H", "x0", "P0"))
     return StateSpace(Phi, Q_d, H, found["R_d"], x0, P0)
-
-
-def of_python(content: Any, name: str) -> StateSpace:
-    module: dict[str, Any] = {"__name__": "noise"}
-    exec(content, module)
-    return StateSpace(*module["matrices"](module["NOISE"][name], module["RATE"]))
 
 
 def of_matlab(content: Any, name: str) -> StateSpace:
@@ -94,7 +88,6 @@ def of_matlab(content: Any, name: str) -> StateSpace:
 LOADED: dict[str, Callable[[Any, str], StateSpace]] = {
     "npz": of_npz,
     "json": of_json,
-    "python": of_python,
     "matlab": of_matlab,
 }
 
@@ -108,8 +101,7 @@ def exported(target: str, models: dict[str, NoiseModel]) -> list[AxisStates]:
     imu = Imu(
         sensor="imu",
         rate=RATE,
-        gyro=AxisNoise(models["gyro"], "a log"),
-        accel=AxisNoise(models["accel"], "a log"),
+        estimated={name: AxisNoise(model, "a log") for name, model in models.items()},
         horizon=HORIZON,
     )
     content = TARGETS[target].write(imu)

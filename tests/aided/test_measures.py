@@ -32,4 +32,4 @@ def test_an_outage_is_as_long_as_it_says(rate: float, length: float) -> None:
         length, rel=2e-3
     )
     assert (select_epochs(drive, length) == ~drive.available).all()
-    assert len(drive.outages) >= 3
+    assert len(drive.of_outages(length)) >= 3

@@ -11,11 +11,12 @@ import pytest
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
-from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
+from imubench_pipeline.extensions.calibration.settings import InPositions
 from imubench_pipeline.extensions.calibration.simulated import compute_readings
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.simulate import _blocks
 from imubench_pipeline.tables.files import build
@@ -56,7 +57,7 @@ def by_hand(roll: float, pitch: float, heading: float, positions: int) -> dict[s
     white = np.repeat([0.0122 * DEGREE, 9.6e-4], 3) * math.sqrt(RATE)
     biases = np.array([0.03 * DEGREE, -0.05 * DEGREE, 0.02 * DEGREE, 0.1, -0.05, 0.07])
     log += biases + white * rng.standard_normal(log.shape)
-    return dict(zip(TRIAD, log.T, strict=True))
+    return dict(zip(CHANNELS, log.T, strict=True))
 
 
 def found(folder: Path, columns: dict[str, np.ndarray], **changes: Any) -> dict[str, Any]:
@@ -117,7 +118,7 @@ def test_what_is_sensed_turns_with_the_triad() -> None:
 
 def test_the_simulated_recording_is_of_the_declared_attitude() -> None:
     plain = {name: {"N": "1e-9 rad/s/sqrt(Hz)" if name[0] == "g" else "1e-9 m/s^2/sqrt(Hz)"}
-             for name in TRIAD}  # fmt: skip
+             for name in CHANNELS}  # fmt: skip
     recording = SimulatedRecording.model_validate(
         {
             "sensor": "s", "recording": "sim_a", "duration": "160 s", "rate": "8 Hz", "seed": 1,

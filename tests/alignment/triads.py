@@ -11,7 +11,9 @@ ATTITUDE = matrix(0.3, -0.2, 1.1)
 
 GYRO = NoiseModel(N=2e-6, B=5e-8, T_B=200.0, K=1e-9)
 ACCELEROMETER = NoiseModel(N=1e-3, B=2e-4, T_B=100.0)
-ALIKE = Triad.of_one_kind(GYRO, ACCELEROMETER, gyro_bias=1e-6, accelerometer_bias=5e-3)
+ALIKE = Triad(
+    gyros=[GYRO] * 3, accelerometers=[ACCELEROMETER] * 3, gyro_bias=1e-6, accelerometer_bias=5e-3
+)
 UNLIKE = Triad(
     gyros=(GYRO, NoiseModel(N=4e-6, K=1e-8), NoiseModel(Q=1e-6, N=1e-6, B=1e-7)),
     accelerometers=(ACCELEROMETER, NoiseModel(N=3e-3, K=1e-5), NoiseModel(N=1e-3, B=1e-4)),

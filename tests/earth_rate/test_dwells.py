@@ -73,7 +73,7 @@ def test_estimates_are_consistent(design, model):
         rng=np.random.default_rng(7),
     )
     found = one.run(drawn.means)
-    freedom = len(one.names) + 1
+    freedom = drawn.states.shape[2] + 1
     after = np.flatnonzero(blocks.dwell >= 1)[1:]
     # The sum over runs at an epoch is chi-squared; a bound for a hundred epochs and designs.
     tail = 1e-6
@@ -117,11 +117,11 @@ def test_the_outlook_is_the_bound_at_every_dwell(dwell):
     design = regular(dwell, 9)
     blocks = design.blocks(choose_block_length(design, PAPER_MODEL))
     last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-    found = outlook.against_time(dwell, 8)
+    found = outlook.sigmas_after(dwell, 8)
     np.testing.assert_allclose(
-        found.sigma, compute_cramer_rao_bounds(blocks, PAPER_MODEL, BIAS)[last][1:], rtol=2e-3
+        found, compute_cramer_rao_bounds(blocks, PAPER_MODEL, BIAS)[last][1:], rtol=2e-3
     )
     turns = outlook.turns_needed(dwell, 0.1)
-    sigma = outlook.against_time(dwell, turns).sigma
+    sigma = outlook.sigmas_after(dwell, turns)
     assert sigma[-1] <= 0.1 * EARTH_RATE * (1 + 1e-9)
     assert turns == 1 or sigma[-2] > 0.1 * EARTH_RATE

@@ -76,14 +76,11 @@ def test_the_filter_reaches_the_bound(bias):
 def test_a_longer_run_is_extrapolated_as_it_is():
     model = NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, T_B=238.1, K=10 * PAPER_MODEL.K)
     outlook = Outlook(model, LATITUDE, 2.0, 32.0)
-    found = outlook.against_time(28.0, 299)
+    found = outlook.sigmas_after(28.0, 299)
     blocks = design_paper_run(150.0).blocks(choose_block_length(design_paper_run(150.0), model))
     last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-    np.testing.assert_allclose(
-        found.sigma, compute_cramer_rao_bounds(blocks, model)[last][1:], rtol=2e-3
-    )
-    assert found.turns[-1] == 299
-    assert found.time[-1] == pytest.approx(300 * 28 + 299 * 2)
+    np.testing.assert_allclose(found, compute_cramer_rao_bounds(blocks, model)[last][1:], rtol=2e-3)
+    assert outlook.run_time(28.0, 299) == pytest.approx(300 * 28 + 299 * 2)
 
 
 @pytest.mark.parametrize("relative", [0.01, 0.1, 1.0])
@@ -94,16 +91,14 @@ def test_the_time_that_white_noise_needs(relative):
     turns = outlook.turns_needed(28.0, relative)
     assert seconds <= (turns + 1) * 28.0 * (1 + 1e-9)
     assert (turns + 1) * 28.0 < seconds * 1.001 + 2 * 28.0
-    assert outlook.time_needed(28.0, relative) == (turns + 1) * 28.0 + turns * 2.0
     if turns > 1:
-        sigma = outlook.against_time(28.0, turns).sigma
+        sigma = outlook.sigmas_after(28.0, turns)
         assert sigma[-1] <= relative * EARTH_RATE * (1 + 1e-9) < sigma[-2]
 
 
 def test_a_goal_out_of_reach_has_no_row():
     noisy = Outlook(NoiseModel(N=1e28), LATITUDE, 2.0, 32.0)
     assert noisy.turns_needed(28.0, 0.1) is None
-    assert noisy.time_needed(28.0, 0.1) == math.inf
     rows = list(prediction_rows(KEY, noisy, 28.0, [0.1], 600.0))
     assert {row.of for row in rows} == {"time", "dwell"}
 
@@ -112,7 +107,7 @@ def test_a_goal_out_of_reach_has_no_row():
 def test_what_is_reached_is_the_end_of_the_course(turns):
     outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)
     assert outlook.sigma_after(28.0, turns) == pytest.approx(
-        outlook.against_time(28.0, turns).sigma[-1], rel=0.01
+        outlook.sigmas_after(28.0, turns)[-1], rel=0.01
     )
 
 
@@ -139,20 +134,20 @@ def test_drift_asks_for_turns_and_turns_cost_time():
     drifting = NoiseModel(N=PAPER_MODEL.N, K=20 * PAPER_MODEL.K)
     curve = Outlook(drifting, LATITUDE, 2.0, 32.0).over_dwell(600.0)
     assert 0 < curve.best < len(curve.dwell) - 1
-    shortest, longest = curve.nearly_best()
-    assert shortest < curve.dwell[curve.best] < longest
-    near = (curve.dwell >= shortest) & (curve.dwell <= longest)
-    np.testing.assert_array_equal(near, curve.sigma <= 1.01 * curve.sigma.min())
+    near = curve.dwell[curve.nearly_best]
+    assert near.min() < curve.dwell[curve.best] < near.max()
+    np.testing.assert_array_equal(curve.nearly_best, curve.sigma <= 1.01 * curve.sigma.min())
     slower = Outlook(drifting, LATITUDE, 10.0, 32.0).over_dwell(600.0)
     assert slower.dwell[slower.best] > curve.dwell[curve.best]
     np.testing.assert_allclose(curve.dwells * curve.dwell + (curve.dwells - 1) * 2.0, 600.0)
 
 
 def test_two_positions_of_white_noise_are_the_gyrocompass():
-    found = Outlook(WHITE, LATITUDE, 0.0, 32.0).heading(60.0, 3)
+    rows = prediction_rows(KEY, Outlook(WHITE, LATITUDE, 0.0, 32.0), 60.0, [1e9], 600.0)
+    goal = next(rows)
     two = Gyrocompass(gyro=WHITE, latitude=LATITUDE, positions=2).heading(120.0)
-    assert found[0] == pytest.approx(two.total, rel=1e-9)
-    assert found.shape == (3,)
+    assert (goal.turns, goal.time) == (1, 120.0)
+    assert goal.heading == pytest.approx(two.total, rel=1e-9)
 
 
 @pytest.mark.release

@@ -13,9 +13,7 @@ from imubench_pipeline.extensions.earth_rate.published import (
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     PAPER_MODEL,
-)
-from imubench_pipeline.extensions.earth_rate.simulation import (
-    PAPER_DESIGN as PAPER,
+    design_paper_run,
 )
 from imubench_pipeline.run.plan import Plan
 
@@ -26,14 +24,14 @@ from imubench_pipeline.run.plan import Plan
      (13, 0.001132, -6.0)],
 )  # fmt: skip
 def test_the_runs_of_the_paper(minutes: float, published: float, off: float) -> None:
-    allowed = compute_allowed_sigmas(PAPER, 60.0 * minutes, PAPER_MODEL)
+    allowed = compute_allowed_sigmas(design_paper_run(minutes), PAPER_MODEL)
     found = (math.radians(published) - EARTH_RATE) / allowed.sigma
     assert found == pytest.approx(off, abs=0.06)
     assert judge_error(found) == ("within the noise" if minutes == 120 else "beyond the noise")
 
 
 def test_white_noise_is_the_least() -> None:
-    found = compute_allowed_sigmas(PAPER, 720.0, PAPER_MODEL)
+    found = compute_allowed_sigmas(design_paper_run(12.0), PAPER_MODEL)
     # 24 dwells of 28 s.
     white = math.radians(0.0122) / math.sqrt(24 * 28.0) / math.cos(ASSUMED_LATITUDE)
     assert found.white == pytest.approx(white)

@@ -38,7 +38,7 @@ def test_the_bound_is_that_of_all_blocks_and_of_the_filter(bias: float) -> None:
 def test_of_white_noise_sigma_goes_as_its_density() -> None:
     model = NoiseModel(N=2e-4)
     drawn = [NoiseModel(N=2e-4 * factor) for factor in np.linspace(0.8, 1.2, 41)]
-    for method, found in compute_sigma_ranges(BLOCKS, model, drawn, None).items():
+    for method, found in compute_sigma_ranges(BLOCKS, drawn, None).items():
         sigma = compute_final_bound(BLOCKS, model)
         if method in ("filter", "smoother"):
             assert found["sigma_lower"] == pytest.approx(0.81 * sigma, rel=1e-6)
@@ -48,9 +48,9 @@ def test_of_white_noise_sigma_goes_as_its_density() -> None:
 
 def test_two_dwells_have_no_triples() -> None:
     two = Experiment.regular(dwell=28.0, turning=2.0, dwells=2, rate=32.0, latitude=0.4)
-    found = compute_sigma_ranges(two.blocks(224), PAPER, [PAPER], None)
+    found = compute_sigma_ranges(two.blocks(224), [PAPER], None)
     assert set(found) == {"pairs", "filter", "smoother"}
-    assert compute_sigma_ranges(BLOCKS, PAPER, [], None) == {}
+    assert compute_sigma_ranges(BLOCKS, [], None) == {}
 
 
 def put_with_limits(folder: Path, spread: float) -> Path:
@@ -80,9 +80,10 @@ def test_a_run_says_how_sure_its_sigma_is(tmp_path: Path) -> None:
         for method in ("pairs", "triples", "filter", "smoother"):
             row = rows[method]
             assert row["sigma_lower"] < row["sigma"] < row["sigma_upper"]
-        assert "sigma_lower" not in rows["known_rate"]
+        assert rows["known_rate"]["sigma_lower"] is None
         widths.append(rows["filter"]["sigma_upper"] / rows["filter"]["sigma_lower"])
-    assert 1.0 < widths[0] < widths[1] < 4.0
+    # The limits of each parameter are apart by 4 at most; 60 draws give their ends to a fifth.
+    assert 1.0 < widths[0] < widths[1] < 1.2 * 4.0
     plain = run(turned, [put_at_rest(tmp_path / "plain")], asked=asked)["earth_rate"]
     filtered = next(row for row in plain if row["method"] == "filter")
     assert filtered["sigma_lower"] == filtered["sigma_upper"] == pytest.approx(filtered["sigma"])

@@ -253,23 +253,6 @@ def test_a_dead_log_is_refused(log: np.ndarray) -> None:
         find_turning(log, RATE, 30.0)
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"rate": 0.0},
-        {"dwell": -1.0},
-        {"turning": 20.0},
-        {"first_sense": 2},
-        {"margin": -1.0},
-        {"position": np.zeros(3)},
-    ],
-)
-def test_arguments_out_of_range_are_refused(wrong: dict[str, object]) -> None:
-    given = {"rate": RATE, "dwell": 30.0, **wrong}
-    with pytest.raises(ValueError, match="|".join([*wrong, "shape"])):
-        find_turning(turned(EVERY_30[:3], 120.0), **given)
-
-
 @pytest.mark.parametrize("declared", [45.0, 60.0, 90.0])
 def test_turns_at_a_quicker_pace_than_declared_are_taken(declared: float) -> None:
     found = find_turning(turned(EVERY_30, 600.0), RATE, declared, first_sense=1)

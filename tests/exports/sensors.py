@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.extensions.exports.imu import AxisNoise, Imu
+from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
@@ -17,10 +18,19 @@ def imu(gyro: NoiseModel = GYRO, accel: NoiseModel = ACCEL, **more: object) -> I
     return Imu(
         sensor="mti_7",
         rate=float(more.pop("rate", RATE)),  # type: ignore[arg-type]  # callers give what the field takes
-        gyro=AxisNoise(gyro, "gyro_z of recording a"),
-        accel=AxisNoise(accel, "accel_x of recording a"),
+        estimated={
+            "gyro": AxisNoise(gyro, "gyro_z of recording a"),
+            "accel": AxisNoise(accel, "accel_x of recording a"),
+        },
         **more,  # type: ignore[arg-type]  # callers give what the field takes
     )
+
+
+def write_text(name: str, sensor: Imu) -> str:
+    """Return the file of a program that is a text."""
+    content = TARGETS[name].write(sensor)
+    assert isinstance(content, str)
+    return content
 
 
 def white_and_walk(per_sample: float, per_step: float, samples: int, seed: int) -> Array:
@@ -55,4 +65,4 @@ def imu_of_each(**more: object) -> Imu:
     for quantity, models in EACH.items():
         each = {name: AxisNoise(one, f"{quantity} {name} of a") for name, one in models.items()}
         chosen[quantity] = AxisNoise(models["z"], f"{quantity} z of a", each=each)
-    return Imu(sensor="mti_7", rate=100.0, **chosen, **more)  # type: ignore[arg-type]  # as above
+    return Imu(sensor="mti_7", rate=100.0, estimated=chosen, **more)  # type: ignore[arg-type]  # as above

@@ -29,16 +29,15 @@ def test_the_figures_are_those_of_the_datasheet_and_of_its_class(
         math.radians(0.014) / math.sqrt(2), rel=1e-3
     )
     said = " ".join(text.replace("#", "").split())
-    assert "CAUTION: these are figures of a data sheet and of its class, and not of a log" in said
+    assert "CAUTION: these are figures of a datasheet and of its class, and not of a log" in said
     assert "gyro: B: the printed bias instability is the lowest point" in said
     (accel,) = (part for part in said.split("accel: ") if part.startswith("B: "))
     assert "NOT PRINTED: the worst of its class" in accel
     imu = build_printed_imu("bmi088", CATALOGUE["bmi088"])
-    assert imu.accel is not None
     worst = find_limit("consumer", "accel", "B").worst
-    assert imu.accel.model.B == pytest.approx(worst / 0.6643, rel=1e-3)
+    assert imu.estimated["accel"].model.B == pytest.approx(worst / 0.6643, rel=1e-3)
     # The walk is as large as the lowest point after 500 s: K^2 500 s / 3.
-    assert imu.accel.model.K == pytest.approx(worst * math.sqrt(3 / 500))
+    assert imu.estimated["accel"].model.K == pytest.approx(worst * math.sqrt(3 / 500))
 
 
 @pytest.mark.parametrize("target", TARGETS)

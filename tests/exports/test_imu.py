@@ -4,13 +4,11 @@ from imubench_pipeline.extensions.exports.imu import (
     AxisNoise,
     ExportError,
     Imu,
-    compute_normal_gravity,
     inflate,
     split_axes,
 )
-from imubench_pipeline.extensions.exports.visual_inertial import write_kalibr as write
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from tests.exports.sensors import EACH, GYRO, imu, imu_of_each
+from tests.exports.sensors import EACH, GYRO, imu, imu_of_each, write_text
 
 
 def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
@@ -29,38 +27,31 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
         imu(inflation=1.5)
     with pytest.raises(ExportError, match="needs its reason"):
         imu(inflation=1.5, because=" ")
-    text = write(imu(inflation=1.5, because="vibration in flight")).replace("\n#  ", "")
+    text = write_text("kalibr", imu(inflation=1.5, because="vibration in flight")).replace(
+        "\n#  ", ""
+    )
     assert "1.5 times" in text
     assert "vibration in flight" in text
     assert f"gyroscope_noise_density: {1.5 * GYRO.N:.6e}" in text
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"rate": 0.0}, {"horizon": -1.0}, {"gravity": float("nan")}, {"horizon": 0.03}]
+    "wrong", [{"rate": 0.0}, {"horizon": -1.0}, {"inflation": float("nan")}, {"horizon": 0.03}]
 )
 def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ExportError):
         imu(**wrong)  # type: ignore[arg-type]  # wrong on purpose
 
 
-def test_gravity_on_the_ellipsoid() -> None:
-    # TR8350.2, table 3.4: at the equator and at the poles
-    assert compute_normal_gravity(0.0) == pytest.approx(9.7803253359, abs=1e-10)
-    assert compute_normal_gravity(90.0) == pytest.approx(9.8321849378, abs=1e-9)
-    assert compute_normal_gravity(-45.0) == compute_normal_gravity(45.0)
-    with pytest.raises(ExportError, match="latitude"):
-        compute_normal_gravity(91.0)
-
-
 def test_a_program_that_needs_both_says_what_is_missing() -> None:
-    alone = Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x"))
+    alone = Imu(sensor="one", rate=100.0, estimated={"gyro": AxisNoise(GYRO, "gyro_x")})
     with pytest.raises(ExportError, match="one: no estimate of accel"):
-        write(alone)
+        write_text("kalibr", alone)
 
 
 def test_simulated_recordings_are_called_so() -> None:
-    assert "SIMULATED" in write(imu(simulated=True))
-    assert "SIMULATED" not in write(imu())
+    assert "SIMULATED" in write_text("kalibr", imu(simulated=True))
+    assert "SIMULATED" not in write_text("kalibr", imu())
 
 
 def test_an_inflation_is_of_each_axis() -> None:

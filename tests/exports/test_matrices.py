@@ -1,18 +1,14 @@
 import io
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 from imubench_pipeline.extensions.exports import matrices
-from imubench_pipeline.extensions.exports.growth import growth
 from imubench_pipeline.extensions.exports.imu import AxisNoise, Imu
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from tests.exports.sensors import ACCEL, GYRO, Array, imu
+from tests.exports.sensors import GYRO, Array, imu
 
 EVERYTHING = NoiseModel(
     N=1e-3, B=2e-3, T_B=7.0, K=3e-4, R=1e-5, further=[GaussMarkov(1e-3, 50.0)],
@@ -32,19 +28,20 @@ def discretised(F: Array, Q: Array, interval: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("model", [GYRO, EVERYTHING, NoiseModel(N=1e-4, B=1e-4)])
 def test_the_discrete_model_is_the_continuous_one_sampled(model: NoiseModel) -> None:
-    found = matrices.compute_matrices(model, 20.0, 30.0)
-    phi, drive = discretised(found.F, found.Q, 0.05)
-    np.testing.assert_allclose(found.Phi, phi, atol=1e-12)
-    np.testing.assert_allclose(found.Q_d, drive, rtol=1e-6, atol=1e-18)
-    np.testing.assert_array_equal(found.H, found.H_continuous)
-    assert found.R_d == pytest.approx(found.R * 20.0)
-    assert len(found.states) == len(found.H) == len(found.x0)
+    continuous, discrete, states = matrices.compute_matrices(model, 20.0, 30.0)
+    phi, drive = discretised(continuous["F"], continuous["Q"], 0.05)
+    np.testing.assert_allclose(discrete["Phi"], phi, atol=1e-12)
+    np.testing.assert_allclose(discrete["Q_d"], drive, rtol=1e-6, atol=1e-18)
+    np.testing.assert_array_equal(discrete["H"], continuous["H"])
+    assert discrete["R_d"] == pytest.approx(continuous["R"] * 20.0)
+    assert len(states) == len(discrete["H"]) == len(discrete["x0"])
 
 
 def test_quantization_noise_is_in_the_discrete_model_alone() -> None:
-    found = matrices.compute_matrices(NoiseModel(Q=1e-6, N=1e-4, K=1e-6), 20.0, 30.0)
-    assert found.F.shape == (1, 1)
-    assert found.Phi.shape == (3, 3)
+    model = NoiseModel(Q=1e-6, N=1e-4, K=1e-6)
+    continuous, discrete, _ = matrices.compute_matrices(model, 20.0, 30.0)
+    assert continuous["F"].shape == (1, 1)
+    assert discrete["Phi"].shape == (3, 3)
 
 
 def test_json_holds_the_matrices_to_the_last_bit() -> None:
@@ -74,41 +71,10 @@ def test_npz_holds_the_same_as_json() -> None:
 
 
 def test_a_sensor_of_one_quantity_and_of_white_noise_alone() -> None:
-    alone = Imu(sensor="one", rate=10.0, accel=AxisNoise(NoiseModel(N=1.0), "accel_x"))
+    alone = Imu(
+        sensor="one", rate=10.0, estimated={"accel": AxisNoise(NoiseModel(N=1.0), "accel_x")}
+    )
     found = json.loads(matrices.write_json(alone))
     assert "gyro" not in found
     assert found["accel"]["discrete"]["Phi"] == []
     assert found["accel"]["discrete"]["R_d"] == 10.0
-
-
-def test_the_snippet_makes_the_same_matrices_at_any_rate() -> None:
-    namespace: dict[str, object] = {"__name__": "noise"}
-    exec(matrices.write_python(imu()), namespace)
-    noises, maker = namespace["NOISE"], namespace["matrices"]
-    for name, model in (("gyro", GYRO), ("accel", ACCEL)):
-        for rate in (1.0, 200.0):
-            phi, drive, output, noise, _, start = maker(noises[name], rate)  # type: ignore[operator]  # the names are those of the program it runs
-            space = model.state_space(rate)
-            np.testing.assert_allclose(phi, space.transition, rtol=1e-14)
-            np.testing.assert_allclose(drive, space.process_noise, rtol=1e-14)
-            np.testing.assert_allclose(output, space.output)
-            assert noise == pytest.approx(space.measurement_noise, rel=1e-14)
-            np.testing.assert_allclose(start, space.initial_variance, rtol=1e-14)
-
-
-def test_the_snippet_runs_alone_and_predicts_the_growth(tmp_path: Path) -> None:
-    flicker = NoiseModel(N=1.1e-3, B=7.2e-4)
-    path = tmp_path / "noise.py"
-    path.write_text(matrices.write_python(imu(accel=flicker)), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-I", str(path)], capture_output=True, text=True, check=True
-    )
-    for line, model in zip(done.stdout.splitlines(), (GYRO, flicker), strict=True):
-        expected = np.sqrt(growth(model, 60.0, 50.0).first[0])
-        assert float(line.split()[1]) == pytest.approx(expected, rel=3e-3)
-
-
-def test_the_snippet_says_what_it_does_not_hold() -> None:
-    text = matrices.write_python(imu(gyro=EVERYTHING))
-    assert "gyro: not included: R = 1.000e-05, line of amplitude" in text.replace("\n#  ", "")
-    assert "gyro: not included" not in matrices.write_python(imu())

@@ -5,7 +5,6 @@ import math
 import pytest
 import yaml
 
-from imubench_pipeline.extensions.exports import px4
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.modes import (
@@ -16,19 +15,19 @@ from imubench_pipeline.extensions.exports.modes import (
 )
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from tests.exports.sensors import imu_of_each
+from tests.exports.sensors import imu_of_each, write_text
 from tests.exports.test_filters import mavparm
 
 GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
 ACCEL = AxisNoise(NoiseModel(N=1e-3, K=2e-5), "accel x of bench")
-IMU = Imu(sensor="mine", rate=200.0, gyro=GYRO, accel=ACCEL)
+IMU = Imu(sensor="mine", rate=200.0, estimated={"gyro": GYRO, "accel": ACCEL})
 
 
 def test_a_program_that_flies_has_its_defaults_unless_bench_is_asked_for() -> None:
     assert choose_mode(None, "px4") == "in-use"
     assert choose_mode("bench", "px4") == "bench"
     assert choose_mode(None, "kalibr") == "bench"
-    text = px4.write(apply_mode(IMU, TARGETS["px4"], choose_mode(None, "px4")))
+    text = write_text("px4", apply_mode(IMU, TARGETS["px4"], choose_mode(None, "px4")))
     values = {
         row.split("\t")[2]: float(row.split("\t")[3])
         for row in text.splitlines()
@@ -60,8 +59,7 @@ def test_ardupilot_has_the_defaults_of_ekf3() -> None:
 def test_the_noise_of_each_axis_is_raised() -> None:
     measured = {"gyro_x": InUseNoise(4e-5, 0.1, 10.0, [])}
     raised = apply_mode(imu_of_each(), TARGETS["gazebo"], "in-use", measured)
-    assert raised.gyro
-    N = {axis: one.model.N for axis, one in raised.gyro.each.items()}
+    N = {axis: one.model.N for axis, one in raised.estimated["gyro"].each.items()}
     assert N == pytest.approx({"x": 4e-5, "z": 5e-5})  # at rest 3e-5 and 5e-5
 
 
@@ -104,10 +102,9 @@ def test_the_noise_of_a_log_in_use_never_lowers_the_noise_at_rest(
         "gyro_y": InUseNoise(noise, 0.1, 10.0, [(50.0, 0.2)]),
     }
     raised = apply_mode(IMU, TARGETS["json"], "in-use", measured)
-    assert raised.gyro is not None and raised.accel is not None
-    assert raised.gyro.model.N == pytest.approx(expected)
-    assert raised.gyro.model.B == GYRO.model.B  # what is slow is not seen in motion
-    assert raised.accel.model.terms == ACCEL.model.terms
+    assert raised.estimated["gyro"].model.N == pytest.approx(expected)
+    assert raised.estimated["gyro"].model.B == GYRO.model.B  # what is slow is not seen in motion
+    assert raised.estimated["accel"].model.terms == ACCEL.model.terms
     assert f"lines at 50 Hz ({number(0.2)} °/s rms)" in raised.mode
     assert "Below 10 Hz all is taken as motion" in raised.mode
     assert ("no more noise than the log at rest" in raised.mode) == (noise < 1e-4)

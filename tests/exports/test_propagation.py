@@ -12,18 +12,11 @@ import pytest
 import yaml
 from scipy.linalg import expm
 
-from imubench_pipeline.extensions.exports import (
-    ardupilot,
-    factor_graphs,
-    gnss_filters,
-    px4,
-    visual_inertial,
-)
-from imubench_pipeline.extensions.exports.growth import growth
 from imubench_pipeline.extensions.exports.imu import Imu
+from imubench_pipeline.extensions.exports.overbound import growth
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from tests.exports.sensors import Array, imu
+from tests.exports.sensors import Array, imu, write_text
 from tests.exports.test_filters import calls, constants, ekf2, from_pyins, mavparm, opencv
 from tests.exports.test_own_parser import script
 
@@ -56,7 +49,7 @@ def continuous(white: float, walk: float, dt: float = 1.0 / RATE) -> tuple[Step,
 
 def kalibr(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # open_vins, Propagator.cpp: sigma^2 / dt and sigma^2 dt, times the squares of the Jacobians
-    found = yaml.safe_load(visual_inertial.write_kalibr(sensor))
+    found = yaml.safe_load(write_text("kalibr", sensor))
     word = {"gyro": "gyroscope", "accel": "accelerometer"}[quantity]
     sample = found[f"{word}_noise_density"] ** 2 * RATE
     return continuous(sample / RATE, found[f"{word}_random_walk"] ** 2)
@@ -64,7 +57,7 @@ def kalibr(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def vins(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # integration_base.h: V diag(n0, n1, w) V', with halves of dt for both ends of a step
-    found = opencv(visual_inertial.write_vins_fusion(sensor))
+    found = opencv(write_text("vins-fusion", sensor))
     word, dt = {"gyro": "gyr", "accel": "acc"}[quantity], 1.0 / RATE
     ends = 2.0 * (0.5 * dt * found[f"{word}_n"]) ** 2
     return linear(coupled(dt), np.diag([ends, (dt * found[f"{word}_w"]) ** 2])), dt
@@ -72,7 +65,7 @@ def vins(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def lio_sam(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # ImuFactor between two key frames, with one bias; the bias changes at a key frame
-    found = yaml.safe_load(visual_inertial.write_lio_sam(sensor))["lio_sam"]
+    found = yaml.safe_load(write_text("lio-sam", sensor))["lio_sam"]
     word, between = {"gyro": "Gyr", "accel": "Acc"}[quantity], 0.1
     white = found[f"imu{word}Noise"] ** 2
     walk = (np.sqrt(between) * found[f"imu{word}BiasN"]) ** 2
@@ -81,7 +74,7 @@ def lio_sam(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def fast_lio(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # esekfom.hpp, predict: (dt f_w) Q (dt f_w)'
-    found = yaml.safe_load(visual_inertial.write_fast_lio(sensor))["mapping"]
+    found = yaml.safe_load(write_text("fast-lio", sensor))["mapping"]
     word, dt = {"gyro": "gyr", "accel": "acc"}[quantity], 1.0 / RATE
     Q = np.diag([found[f"{word}_cov"], found[f"b_{word}_cov"]])
     return linear(coupled(dt), dt**2 * Q), dt
@@ -89,7 +82,7 @@ def fast_lio(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def gtsam(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # CombinedImuFactor.cpp: theta_H_omega (wCov / dt) theta_H_omega', dt biasOmegaCovariance
-    found = calls(factor_graphs.write_gtsam(sensor))
+    found = calls(write_text("gtsam", sensor))
     white, walk = {
         "gyro": ("setGyroscopeCovariance", "setBiasOmegaCovariance"),
         "accel": ("setAccelerometerCovariance", "setBiasAccCovariance"),
@@ -99,7 +92,7 @@ def gtsam(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def matlab_factor(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # imu_factor.cpp: GyroscopeNoise / DeltaT a sample; SumDeltaT GyroscopeBiasNoise between nodes
-    (statement,) = script(factor_graphs.write_matlab_factor(sensor))
+    (statement,) = script(write_text("matlab-factor", sensor))
     word, between = {"gyro": "Gyroscope", "accel": "Accelerometer"}[quantity], 0.1
     white, walk = (
         float(statement.split(f"{word}{kind}=[")[1].split(",")[0])
@@ -111,7 +104,7 @@ def matlab_factor(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 
 def ceres(sensor: Imu, quantity: str) -> tuple[Step, float]:
-    found = constants(factor_graphs.write_ceres(sensor))
+    found = constants(write_text("ceres", sensor))
     word = {"gyro": "Gyro", "accel": "Accel"}[quantity]
     return continuous(found[f"k{word}NoiseDensity"][0] ** 2, found[f"k{word}RandomWalk"][0] ** 2)
 
@@ -122,7 +115,7 @@ def pyins(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 
 def px4_ekf2(sensor: Imu, quantity: str) -> tuple[Step, float]:
-    found = ekf2(px4.write(sensor))
+    found = ekf2(write_text("px4", sensor))
     word, dt = {"gyro": "GYR", "accel": "ACC"}[quantity], found["EKF2_PREDICT_US"] * 1e-6
     noises = [found[f"EKF2_{word}_NOISE"], found[f"EKF2_{word}_B_NOISE"]]
     return linear(coupled(dt), np.diag(np.square(noises)) * dt**2), dt
@@ -130,7 +123,7 @@ def px4_ekf2(sensor: Imu, quantity: str) -> tuple[Step, float]:
 
 def ekf3(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # AP_NavEKF3_core.cpp: sq(dt _gyrNoise), sq(sq(dt) _gyroBiasProcessNoise) of a delta angle
-    found, dt = mavparm(ardupilot.write(sensor)), 0.012
+    found, dt = mavparm(write_text("ardupilot", sensor)), 0.012
     word, bias = {"gyro": ("GYRO", "GBIAS"), "accel": ("ACC", "ABIAS")}[quantity]
     noises = [dt * found[f"EK3_{word}_P_NSE"], dt**2 * found[f"EK3_{bias}_P_NSE"]]
     return linear(coupled(1.0), np.diag(np.square(noises))), dt
@@ -151,17 +144,17 @@ def gins(found: dict[str, float], quantity: str) -> tuple[Step, float]:
 
 
 def kf_gins(sensor: Imu, quantity: str) -> tuple[Step, float]:
-    return gins(yaml.safe_load(gnss_filters.write_kf_gins(sensor))["imunoise"], quantity)
+    return gins(yaml.safe_load(write_text("kf-gins", sensor))["imunoise"], quantity)
 
 
 def ob_gins(sensor: Imu, quantity: str) -> tuple[Step, float]:
-    return gins(yaml.safe_load(gnss_filters.write_ob_gins(sensor))["imumodel"], quantity)
+    return gins(yaml.safe_load(write_text("ob-gins", sensor))["imumodel"], quantity)
 
 
 def navego(sensor: Imu, quantity: str) -> tuple[Step, float]:
     # kf_prediction.m: A = expm(F dt), Qd = G Q G' dt, Q = diag([arw, vrw, gb_psd, ab_psd].^2)
     found = {}
-    for statement in script(gnss_filters.write_navego(sensor)):
+    for statement in script(write_text("navego", sensor)):
         name, values = statement.removeprefix("imu.").rstrip(";").split(" = ")
         found[name] = [float(one) for one in values.strip("[]").split(", ")]
     letter, white = {"gyro": ("g", "arw"), "accel": ("a", "vrw")}[quantity]
@@ -218,7 +211,7 @@ def test_the_predicted_covariance_is_the_one_of_simulated_errors(name: str, quan
         P = step(P)
     model = models[quantity]
     assert P[0, 0] == pytest.approx(simulated_variance(model), rel=4.0 * np.sqrt(2.0 / 4000))
-    exact = growth(model, steps * dt, RATE).first[0]
+    exact = growth(model, np.array([steps * dt]), RATE)[0][0]
     assert exact > 2.0 * model.N**2 * SECONDS  # the bias is seen, too
     assert P[0, 0] == pytest.approx(exact, rel=0.01)  # LIO-SAM's key frames: 0.5 %
 
@@ -233,7 +226,7 @@ def test_each_filter_is_propagated() -> None:
 def test_covariances_of_ros_and_bias_of_pyins_are_those_of_readings(quantity: str) -> None:
     model, horizon = WALKS[quantity], 10.0
     sensor = imu(**WALKS, rate=20.0, horizon=horizon)
-    message = yaml.safe_load(gnss_filters.write_ros(sensor))
+    message = yaml.safe_load(write_text("ros", sensor))
     word = {"gyro": "angular_velocity", "accel": "linear_acceleration"}[quantity]
     covariance = np.reshape(message[f"{word}_covariance"], (3, 3))
     assert np.array_equal(covariance, np.diag(np.diag(covariance)))
@@ -246,6 +239,6 @@ def test_covariances_of_ros_and_bias_of_pyins_are_those_of_readings(quantity: st
     readings = np.mean((log[:, half:] - bias[:, None]) ** 2)
     assert covariance[0, 0] == pytest.approx(readings, rel=0.03)  # 1 % 1 sigma
 
-    text = gnss_filters.write_pyins(sensor).split(f"{quantity}_model")[1]
+    text = write_text("pyins", sensor).split(f"{quantity}_model")[1]
     deviation = float(text.split("bias_sd=[")[1].split(",")[0])
     assert deviation == pytest.approx(np.std(walk[:, half - 1] - bias), rel=0.06)

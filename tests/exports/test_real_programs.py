@@ -8,7 +8,6 @@ tests are skipped.
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +16,11 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.exports import (
-    ardupilot,
-    factor_graphs,
-    gnss_filters,
-    px4,
-    simulators,
-    visual_inertial,
-)
-from imubench_pipeline.extensions.exports.growth import growth
-from imubench_pipeline.extensions.exports.imu import Imu
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.extensions.exports.overbound import growth
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from tests.exports.sensors import EACH, Array, imu, imu_of_each
+from tests.exports.sensors import EACH, Array, imu, imu_of_each, write_text
 from tests.exports.test_filters import ekf2, mavparm
 
 MODELS = {
@@ -57,8 +48,8 @@ def walks(quantity: str, horizon: float) -> list[NoiseModel]:
 def test_gtsam_predicts_the_growth_of_the_errors() -> None:
     gtsam = pytest.importorskip("gtsam", reason="pip install gtsam; some 30 MB")
     sensor, seconds, dt = imu_of_each(horizon=20.0), 20.0, 0.01
-    params = run(factor_graphs.write_gtsam(sensor))["make_params"]()
-    np.testing.assert_allclose(params.n_gravity, [0.0, 0.0, -sensor.gravity])
+    params = run(write_text("gtsam", sensor))["make_params"]()
+    np.testing.assert_allclose(params.n_gravity, [0.0, 0.0, -STANDARD_GRAVITY])
     still = np.zeros(3)
     found = gtsam.PreintegratedCombinedMeasurements(params, gtsam.imuBias.ConstantBias())
     for _ in range(round(seconds / dt)):
@@ -66,12 +57,12 @@ def test_gtsam_predicts_the_growth_of_the_errors() -> None:
     covariance = np.diag(found.preintMeasCov())
     for name, angle, bias in (("gyro", 0, 12), ("accel", 6, 9)):
         for axis, model in enumerate(walks(name, 20.0)):
-            expected = growth(model, seconds, 100.0).first[0]
+            expected = growth(model, np.array([seconds]), 100.0)[0][0]
             assert covariance[angle + axis] == pytest.approx(expected, rel=2e-3), (name, axis)
             assert covariance[bias + axis] == pytest.approx(model.K**2 * seconds, rel=1e-5)
     # the position: white noise of the accelerometer, and its walk, integrated twice
     for axis, model in enumerate(walks("accel", 20.0)):
-        expected = growth(model, seconds, 100.0).second[0]
+        expected = growth(model, np.array([seconds]), 100.0)[1][0]
         assert covariance[3 + axis] == pytest.approx(expected, rel=5e-3)
     # the same parameters, without the biases
     alone = gtsam.PreintegratedImuMeasurements(params, gtsam.imuBias.ConstantBias())
@@ -92,12 +83,12 @@ def test_pymavlink_loads_the_parameters(tmp_path: Path, capsys: pytest.CaptureFi
         assert parameters.load(str(path))
         return dict(parameters)
 
-    found = load(px4.write_mavparm(imu()))
-    assert found == ekf2(px4.write(imu())) and len(found) == 5
-    of_ardupilot = ardupilot.write(imu())
+    found = load(write_text("px4-mavparm", imu()))
+    assert found == ekf2(write_text("px4", imu())) and len(found) == 5
+    of_ardupilot = write_text("ardupilot", imu())
     assert load(of_ardupilot) == mavparm(of_ardupilot)
     assert "Invalid line" not in capsys.readouterr().out
-    assert load(px4.write(imu())) == {}  # a file of QGroundControl is another form
+    assert load(write_text("px4", imu())) == {}  # a file of QGroundControl is another form
 
 
 def test_pyins_takes_the_models_and_simulates_them() -> None:
@@ -105,7 +96,7 @@ def test_pyins_takes_the_models_and_simulates_them() -> None:
     import pandas as pd
 
     sensor = imu_of_each(horizon=20.0)
-    namespace = run(gnss_filters.write_pyins(sensor))
+    namespace = run(write_text("pyins", sensor))
     for name in ("gyro", "accel"):
         model, expected = namespace[f"{name}_model"], walks(name, 20.0)
         np.testing.assert_allclose(model.noise, [one.N for one in expected], rtol=1e-6)
@@ -134,7 +125,7 @@ def test_gnss_ins_sim_simulates_each_axis() -> None:
     models = pytest.importorskip("gnss_ins_sim.sim.imu_model", reason=reason)
     pathgen = pytest.importorskip("gnss_ins_sim.pathgen.pathgen", reason=reason)
     sensor = imu_of_each()
-    found = models.IMU(accuracy=run(simulators.write_gnss_ins_sim(sensor))["imu_err"])
+    found = models.IMU(accuracy=run(write_text("gnss-ins-sim", sensor))["imu_err"])
     np.random.seed(3)  # noqa: NPY002  # the program draws from it
     still, rate = np.zeros((1_000_000, 3)), 20.0
     for name, log in (
@@ -147,16 +138,16 @@ def test_gnss_ins_sim_simulates_each_axis() -> None:
 
 @pytest.mark.release
 @pytest.mark.parametrize(
-    ("write", "names"),
+    ("target", "names"),
     [
-        (visual_inertial.write_orb_slam3, ("IMU.NoiseGyro", "IMU.AccWalk", "IMU.Frequency")),
-        (visual_inertial.write_vins_fusion, ("gyr_n", "acc_w", "g_norm")),
-        (visual_inertial.write_openvins, ("imu0",)),
+        ("orb-slam3", ("IMU.NoiseGyro", "IMU.AccWalk", "IMU.Frequency")),
+        ("vins-fusion", ("gyr_n", "acc_w", "g_norm")),
+        ("openvins", ("imu0",)),
     ],
 )
-def test_opencv_reads_real_numbers(write: Callable[[Imu], str], names: tuple[str, ...]) -> None:
+def test_opencv_reads_real_numbers(target: str, names: tuple[str, ...]) -> None:
     cv2 = pytest.importorskip("cv2", reason="pip install opencv-python-headless; some 60 MB")
-    text = write(imu())
+    text = write_text(target, imu())
     storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     expected = yaml.safe_load(text.split("\n", 1)[1])
     for name in names:
@@ -177,7 +168,7 @@ def test_another_reader_of_yaml_finds_the_same(name: str) -> None:
 def test_a_message_of_ros_takes_the_covariances() -> None:
     stores = pytest.importorskip("rosbags.typesys", reason="the extra ros")
     store = stores.get_typestore(stores.Stores.ROS2_HUMBLE)
-    found = yaml.safe_load(gnss_filters.write_ros(imu_of_each()))
+    found = yaml.safe_load(write_text("ros", imu_of_each()))
     kind = store.types["sensor_msgs/msg/Imu"]
     vector = store.types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
     header = store.types["std_msgs/msg/Header"](
@@ -199,7 +190,7 @@ def test_a_compiler_takes_the_header(tmp_path: Path) -> None:
     compiler = shutil.which("g++") or shutil.which("clang++")
     if compiler is None:
         pytest.skip("no compiler of C++ is installed")
-    text = factor_graphs.write_ceres(imu_of_each(cautions=["ends with a backslash \\"]))
+    text = write_text("ceres", imu_of_each(cautions=["ends with a backslash \\"]))
     assert re.search(r"\\\.?$", text, re.MULTILINE)
     (tmp_path / "imu_noise.hpp").write_text(text, encoding="utf-8")
     gyro = [model.N for model in MODELS["gyro"]]
@@ -223,7 +214,7 @@ def test_a_compiler_takes_the_header(tmp_path: Path) -> None:
 
 def test_the_elements_of_gazebo_are_those_of_the_specification() -> None:
     # sdf/1.9/noise.sdf and imu.sdf of gazebosim/sdformat; its reader warns of any other
-    text = simulators.write_gazebo(imu_of_each())
+    text = write_text("gazebo", imu_of_each())
     noise = {
         "mean",
         "stddev",

@@ -98,13 +98,12 @@ def test_an_axis_whose_walk_is_not_determined_has_its_own_limit(
     others = [row for row in tables["parameters"].to_pylist() if row["channel"] != "gyro_x"]
     parameters = pa.concat_tables([build("parameters", [*rows]), build("parameters", others)])
     built = build_imu(tables | {"parameters": parameters}, replace(REQUEST, target="basalt"))
-    assert built.gyro
-    x, y = (built.gyro.each[axis] for axis in "xy")
+    x, y = (built.estimated["gyro"].each[axis] for axis in "xy")
     assert x.slow_limited and not y.slow_limited
     # above white noise the curve of gyro x has its process and walk: K^2 h / 3 is at least that
     slow = replace(GYRO, N=0.0).allan_variance(np.array([60.0]))[0]
     assert x.model.K == pytest.approx(np.sqrt(3.0 * slow / 60.0), rel=0.2)
-    assert y.model.terms == CHANNELS["gyro_y"].terms == built.gyro.model.terms
+    assert y.model.terms == CHANNELS["gyro_y"].terms == built.estimated["gyro"].model.terms
 
 
 def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table]:
@@ -185,9 +184,10 @@ def test_an_overbound_has_the_terms_that_the_program_holds(
 ) -> None:
     gyros = tables | {"parameters": tables["parameters"].slice(0, 8)}
     sensor = build_imu(gyros, replace(REQUEST, target=name, mode="bounded"))
-    assert sensor.gyro is not None
-    assert set(sensor.gyro.model.name.split("+")) <= set(TARGETS[name].family.split("+"))
-    both = replace(sensor, accel=sensor.gyro)
+    assert set(sensor.estimated["gyro"].model.name.split("+")) <= set(
+        TARGETS[name].family.split("+")
+    )
+    both = replace(sensor, estimated=dict.fromkeys(("gyro", "accel"), sensor.estimated["gyro"]))
     text = TARGETS[name].write(both)
     assert isinstance(text, str)
     assert "replaced by" not in text
@@ -209,14 +209,12 @@ def test_an_overbound_lies_above_the_draws_of_the_recording(
         found = build_imu(
             tables, replace(REQUEST, mode="bounded", horizon=600.0, most_excess=20.0), tmp_path
         )
-        assert found.gyro is not None
-        return found.gyro.model
+        return found.estimated["gyro"].model
 
     without = build_imu(
         tables, replace(REQUEST, mode="bounded", horizon=600.0, most_excess=20.0)
-    ).gyro
+    ).estimated["gyro"]
     # Sure of the fit, only the measured curve is widened; else the bound is as much larger.
-    assert without is not None
     sure, unsure = bounded(1.001), bounded(2.0)
     assert sure.K < without.model.K < unsure.K
     assert 2e-4 < sure.N < 2e-4 * 1.1 < 2e-4 * 1.7 < unsure.N < 2e-4 * 2.3
@@ -241,7 +239,7 @@ def test_an_overbound_is_larger_and_says_what_it_is(
 
 def test_a_bound_with_one_number_is_above_every_axis(tables: dict[str, pa.Table]) -> None:
     found = build_imu(tables, replace(REQUEST, target="gtsam", mode="bounded"))
-    for axis in (found.gyro, found.accel):
+    for axis in found.estimated.values():
         assert axis is not None
         for own in axis.each.values():
             assert axis.model.N >= own.model.N
@@ -278,15 +276,12 @@ def test_a_walk_that_cannot_follow_is_warned_of(tables: dict[str, pa.Table]) -> 
     assert isinstance(text, str)
     joined = text.replace("\n#  ", "")
     assert "WARNING: the Allan deviation of the smallest N+K is" in joined
-    assert "gnss-ins-sim; N+GM+K is supported by matlab, json, npz, python" in joined
+    assert "gnss-ins-sim; N+GM+K is supported by matlab, json, npz" in joined
 
 
-def test_gravity_and_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
-    asked = replace(
-        REQUEST, latitude=0.0, rate=200.0, inflation=2.0, because="it flies", axis="serial 1"
-    )
+def test_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
+    asked = replace(REQUEST, rate=200.0, inflation=2.0, because="it flies", axis="serial 1")
     sensor = build_imu(tables, asked)
-    assert sensor.gravity == pytest.approx(9.7803253359)
     assert sensor.rate == 200.0
     assert sensor.axes["accel"].model.N == pytest.approx(2.2e-3)
     assert sensor.simulated

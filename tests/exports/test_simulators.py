@@ -9,10 +9,9 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.exports import simulators
 from imubench_pipeline.extensions.exports.imu import AxisNoise, Imu
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from tests.exports.sensors import ACCEL, EACH, GYRO, Array, imu, imu_of_each
+from tests.exports.sensors import ACCEL, EACH, GYRO, Array, imu, imu_of_each, write_text
 
 RATE = 20.0
 
@@ -27,7 +26,7 @@ def compared(log: Array, model: NoiseModel, rate: float, tau: list[float]) -> Ar
 
 def error_dictionary(sensor: Imu) -> dict[str, Array]:
     namespace: dict[str, dict[str, Array]] = {}
-    exec(simulators.write_gnss_ins_sim(sensor), namespace)
+    exec(write_text("gnss-ins-sim", sensor), namespace)
     return namespace["imu_err"]
 
 
@@ -76,7 +75,7 @@ def test_gnss_ins_sim_takes_the_deviation_of_the_process_and_not_its_bias_instab
 
 
 def test_gnss_ins_sim_says_where_a_process_is_too_short_for_it() -> None:
-    text = simulators.write_gnss_ins_sim(imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=0.1), rate=RATE))
+    text = write_text("gnss-ins-sim", imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=0.1), rate=RATE))
     assert "inaccurate for so short a process" in text.replace("\n#  ", "")
 
 
@@ -108,7 +107,7 @@ def imu_sensor_log(text: str, member: str, rate: float, samples: int, seed: int)
 
 @pytest.mark.parametrize("member", ["Gyroscope", "Accelerometer"])
 def test_matlab_makes_the_model_at_every_tau(member: str) -> None:
-    text = simulators.write_matlab(imu(rate=RATE))
+    text = write_text("matlab", imu(rate=RATE))
     assert f"IMU.SampleRate = {RATE:g};" in text
     log = imu_sensor_log(text, member, RATE, round(80_000.0 * RATE), 3)
     model = {"Gyroscope": GYRO, "Accelerometer": ACCEL}[member]
@@ -118,7 +117,7 @@ def test_matlab_makes_the_model_at_every_tau(member: str) -> None:
 def test_matlab_makes_flicker_noise_up_to_the_horizon() -> None:
     model = NoiseModel(N=1e-5, B=1e-3, K=1e-6)
     rate = 10.0
-    text = simulators.write_matlab(imu(gyro=model, rate=rate, horizon=15.0))
+    text = write_text("matlab", imu(gyro=model, rate=rate, horizon=15.0))
     assert "fractalcoef(300)" in text
     log = imu_sensor_log(text, "Gyroscope", rate, 400_000, 4)
     n = np.array([10, 50, 150])
@@ -127,20 +126,22 @@ def test_matlab_makes_flicker_noise_up_to_the_horizon() -> None:
 
 
 def test_matlab_without_poles_enough_takes_the_nearest_process() -> None:
-    text = simulators.write_matlab(imu(gyro=NoiseModel(N=1e-5, B=1e-3), rate=1000.0, horizon=60.0))
+    text = write_text("matlab", imu(gyro=NoiseModel(N=1e-5, B=1e-3), rate=1000.0, horizon=60.0))
     assert "replaced by a Gauss-Markov process" in text.replace("\n%  ", "")
 
 
 def test_matlab_takes_one_quantity_alone() -> None:
-    text = simulators.write_matlab(Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x")))
+    text = write_text(
+        "matlab", Imu(sensor="one", rate=100.0, estimated={"gyro": AxisNoise(GYRO, "gyro_x")})
+    )
     assert "IMU.Gyroscope" in text
     assert "IMU.Accelerometer" not in text
 
 
 def test_two_processes_are_replaced_by_one_in_both() -> None:
     model = NoiseModel(N=1e-4, B=1e-4, T_B=5.0, further=[GaussMarkov(1e-4, 50.0)])
-    for write in (simulators.write_matlab, simulators.write_gnss_ins_sim):
-        text = write(imu(gyro=model))
+    for target in ("matlab", "gnss-ins-sim"):
+        text = write_text(target, imu(gyro=model))
         joined = re.sub(r"\n[#%]  +", " ", text)
         assert "with the same Allan variance at the horizon of 60 s" in joined
 
@@ -172,7 +173,7 @@ def gazebo_log(found: dict[str, float], rate: float, samples: int, seed: int) ->
 @pytest.mark.parametrize("path", ["angular_velocity/x", "linear_acceleration/z"])
 def test_gazebo_makes_the_model(path: str) -> None:
     model = NoiseModel(N=1e-4, B=9e-5, T_B=30.0)
-    text = simulators.write_gazebo(imu(gyro=model, accel=model, rate=RATE))
+    text = write_text("gazebo", imu(gyro=model, accel=model, rate=RATE))
     found = gazebo_noise(text)[path]
     assert f"<update_rate>{RATE}</update_rate>" in text
     log = gazebo_log(found, RATE, round(60_000.0 * RATE), 5)
@@ -184,7 +185,7 @@ def test_gazebo_makes_the_model(path: str) -> None:
 def test_each_axis_is_simulated_with_its_own_noise() -> None:
     sensor = imu_of_each()
     N = {name: [models.get(axis, models["z"]).N for axis in "xyz"] for name, models in EACH.items()}
-    text = simulators.write_gnss_ins_sim(sensor)
+    text = write_text("gnss-ins-sim", sensor)
     namespace: dict[str, dict[str, Array]] = {}
     exec(text, namespace)
     found = namespace["imu_err"]
@@ -195,21 +196,21 @@ def test_each_axis_is_simulated_with_its_own_noise() -> None:
     assert "gyro: the axes without an estimate have the following noise." in joined
     assert "accel: the axes" not in joined
     stddev = {
-        name: one["stddev"] for name, one in gazebo_noise(simulators.write_gazebo(sensor)).items()
+        name: one["stddev"] for name, one in gazebo_noise(write_text("gazebo", sensor)).items()
     }
     for axis, of_gyro, of_accel in zip("xyz", N["gyro"], N["accel"], strict=True):
         assert stddev[f"angular_velocity/{axis}"] == pytest.approx(10.0 * of_gyro, rel=1e-6)
         assert stddev[f"linear_acceleration/{axis}"] == pytest.approx(10.0 * of_accel, rel=1e-6)
-    vectors = re.findall(r"'NoiseDensity', \[([^\]]+)\]", simulators.write_matlab(sensor))
+    vectors = re.findall(r"'NoiseDensity', \[([^\]]+)\]", write_text("matlab", sensor))
     for vector, expected in zip(vectors, N.values(), strict=True):
         np.testing.assert_allclose([float(one) for one in vector.split(", ")], expected, rtol=1e-6)
 
 
 def test_an_overbound_is_of_the_chosen_axis_for_all() -> None:
     sensor = imu_of_each()
-    assert sensor.gyro
-    bounded = replace(sensor, gyro=replace(sensor.gyro, bounded=(0.01, 1.0)))
-    found = gazebo_noise(simulators.write_gazebo(bounded))
+    gyro = replace(sensor.estimated["gyro"], bounded=(0.01, 1.0))
+    bounded = replace(sensor, estimated={**sensor.estimated, "gyro": gyro})
+    found = gazebo_noise(write_text("gazebo", bounded))
     assert len({found[f"angular_velocity/{axis}"]["stddev"] for axis in "xyz"}) == 1
 
 
@@ -217,8 +218,8 @@ def test_axes_with_other_correlation_times_share_one_filter_in_matlab() -> None:
     times = {"x": 20.0, "y": 60.0, "z": 90.0}
     models = {axis: NoiseModel(N=1e-5, B=4e-5, T_B=T) for axis, T in times.items()}
     each = {axis: AxisNoise(model, axis) for axis, model in models.items()}
-    sensor = Imu(sensor="s", rate=RATE, gyro=AxisNoise(models["z"], "z", each=each))
-    text = simulators.write_matlab(sensor)
+    sensor = Imu(sensor="s", rate=RATE, estimated={"gyro": AxisNoise(models["z"], "z", each=each)})
+    text = write_text("matlab", sensor)
     pole = float(re.search(r"'Denominator', \[1, -([^\]]+)\]", text)[1])  # type: ignore[index]  # or fails
     T_B = -1.0 / (RATE * np.log(pole))
     assert 20.0 < T_B < 90.0

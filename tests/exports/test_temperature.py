@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.extensions.exports import ardupilot, px4, simulators
 from imubench_pipeline.extensions.exports.imu import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
-from tests.exports.sensors import imu
+from tests.exports.sensors import imu, write_text
 from tests.exports.test_filters import ekf2, mavparm
 from tests.rows import typed
 
@@ -63,7 +62,7 @@ def test_px4_takes_off_what_temperature_adds_within_the_range_of_the_log() -> No
         rows("gyro_y", T_0=(32.0, None, None, "ok"), quadratic=(-2e-6, -3e-6, -1e-6, "ok")),
         rows("gyro_z", compensated=False),
     )
-    text = px4.write(imu(temperature={"gyro": told}))
+    text = write_text("px4", imu(temperature={"gyro": told}))
     found = ekf2(text)
     for temperature in (18.0, 30.0, 37.0):
         dT = temperature - 30.0
@@ -92,7 +91,7 @@ def test_ardupilot_takes_off_the_change_between_two_temperatures() -> None:
     told = effect(
         rows("gyro_x", quadratic=(1e-6, 9e-7, 1.1e-6, "ok")), rows("gyro_z", compensated=False)
     )
-    found = mavparm(ardupilot.write(imu(temperature={"gyro": told})))
+    found = mavparm(write_text("ardupilot", imu(temperature={"gyro": told})))
     for temperature in (18.0, 26.0, 41.0):
         change = ardupilot_change(found, "X", temperature) - ardupilot_change(found, "X", 30.0)
         dT = temperature - 30.0
@@ -101,12 +100,12 @@ def test_ardupilot_takes_off_the_change_between_two_temperatures() -> None:
     assert ardupilot_change(found, "X", 60.0) == ardupilot_change(found, "X", 41.0)
     assert all(found[f"INS_TCAL1_ACC{n}_X"] == 0.0 for n in (1, 2, 3))
     assert "INS_TCAL1_ENABLE" not in found  # the user switches it on
-    assert not any(name.startswith("INS") for name in mavparm(ardupilot.write(imu())))
+    assert not any(name.startswith("INS") for name in mavparm(write_text("ardupilot", imu())))
 
 
 def test_matlab_adds_nothing_at_the_reference_and_a_line_elsewhere() -> None:
     told = effect(rows("gyro_x"), rows("gyro_y", quadratic=(1e-6, 9e-7, 1.1e-6, "ok")))
-    text = simulators.write_matlab(imu(temperature={"gyro": told}))
+    text = write_text("matlab", imu(temperature={"gyro": told}))
     vectors = {
         name: [float(one) for one in values.split(", ")]
         for name, values in re.findall(r"'(ConstantBias|TemperatureBias)', \[([^\]]+)\]", text)
@@ -135,8 +134,8 @@ def test_what_is_not_safe_is_left_out_with_the_reason(changes: dict[str, Any], r
     told = effect(rows("gyro_x", **changes))
     assert not told.slope
     assert any(reason in note for note in told.notes)
-    for write in (px4.write, simulators.write_matlab):
-        text = write(imu(temperature={"gyro": told}))
+    for target in ("px4", "matlab"):
+        text = write_text(target, imu(temperature={"gyro": told}))
         assert reason in re.sub(r"\n[#%]  ", "", text)
         assert "TC_G0" not in text and "'TemperatureBias'" not in text
 

@@ -18,7 +18,7 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
-    make_marks,
+    make_mark,
 )
 from imubench_pipeline.extensions.figures.curves import (
     CHARACTERISTIC,
@@ -215,10 +215,14 @@ def test_undetermined_term_is_marked_not_determined() -> None:
     assert "rate random walk, K = 6 °/h/√h (not determined)" in written(
         made(draw_terms_figure(view))
     )
-    (mark,) = make_marks(view, "K", 0.0)
-    assert (mark.kind, mark.value, mark.lower) == ("not identified", MODEL.K, MODEL.K / 9)
-    figure = draw_forest_figure([view], ["imu"], symbol="K")
-    (dot,) = [each for each in figure.axes[0].lines if each.get_marker() == "o"]
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value, mark.lower) == (
+        "not identified",
+        MODEL.K,
+        MODEL.K / 9,
+    )
+    figure = draw_forest_figure([view], ["imu"])
+    (dot,) = [each for each in figure.axes[-1].lines if each.get_marker() == "o"]
     assert dot.get_markerfacecolor() == "white"
     assert "not determined: fitted value, 95 % limits" in written(figure)
 
@@ -228,12 +232,11 @@ def test_a_channel_without_k() -> None:
     view = view_of(parameters=KNOWN | {"K": Parameter(None, "absent", upper=0.3 * HOUR)})
     (axes,) = made(draw_terms_figure(view)).axes
     assert not [each for each in axes.lines if "random walk, $K$" in str(each.get_label())]
-    assert [(mark.kind, mark.value) for mark in make_marks(view, "K", 0.0)] == [
-        ("limit", 0.3 * HOUR)
-    ]
-    assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"], symbol="K"))
-    nothing = view_of(parameters=KNOWN | {"K": Parameter(None, "absent")})
-    found = written(draw_forest_figure([nothing], ["imu"], symbol="K"))
+    mark = make_mark(view, "K", 0.0)
+    assert mark is not None and (mark.kind, mark.value) == ("limit", 0.3 * HOUR)
+    assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"]))
+    nothing = view_of(parameters=dict.fromkeys(KNOWN, Parameter(None, "absent")))
+    found = written(draw_forest_figure([nothing], ["imu"]))
     assert "not in the model" in found and "no recording has a value" in found
 
 
@@ -317,7 +320,7 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
     found = texts(figure, tmp_path)
     assert found.count("imu" if recordings == 1 else f"imu ({recordings} recordings)") == 1
     assert "other" in found and legend_is_clear(figure)
-    forest = draw_forest_figure(views, ["imu", "other"], symbol="N")
+    forest = draw_forest_figure(views, ["imu", "other"])
     assert ("imu" if recordings == 1 else f"imu (n = {recordings})") in written(forest)
     assert legend_is_clear(forest) and forest.get_figheight() * 25.4 < 235.0
     (dots,) = [each for each in forest.axes[0].lines if len(each.get_ydata()) == recordings][:1]
@@ -345,7 +348,7 @@ def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
         (each.get_color(), each.get_linestyle(), each.get_marker()) for each in figure.axes[0].lines
     }
     assert len(looks) == sensors
-    forest = draw_forest_figure(views, names, symbol="N")
+    forest = draw_forest_figure(views, names)
     assert len(forest.axes[0].get_yticklabels()) == sensors
     assert all(text.get_window_extent().x0 >= 0 for text in forest.axes[0].get_yticklabels())
 
@@ -383,9 +386,9 @@ def test_the_same_data_make_the_same_bytes(tmp_path: Path) -> None:
     kinds = ("svg", "pdf")
     before = {key: mpl.rcParams[key] for key in ("font.size", "svg.fonttype", "axes.grid")}
     for kind in kinds:
-        save(draw_forest_figure([usual()], ["imu"], symbol="B"), tmp_path / f"first.{kind}")
+        save(draw_forest_figure([usual()], ["imu"]), tmp_path / f"first.{kind}")
         with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "red"}):
-            save(draw_forest_figure([usual()], ["imu"], symbol="B"), tmp_path / f"second.{kind}")
+            save(draw_forest_figure([usual()], ["imu"]), tmp_path / f"second.{kind}")
         first, second = ((tmp_path / f"{n}.{kind}").read_bytes() for n in ("first", "second"))
         assert first == second
     assert first.startswith(b"%PDF") and b"CreationDate" not in first

@@ -5,20 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.extensions.fusion.board import Board, Shared, block_mean_spectrum, divided
-from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum
+from imubench_pipeline.extensions.fusion.board import Board, Shared, divided
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.state_space import of_block_means
 
 MODEL = NoiseModel(Q=1e-6, N=1e-4, B=5e-5, T_B=0.4, K=1e-6)
-
-
-@pytest.mark.parametrize("size", [1, 2, 5, 50])
-def test_block_means_keep_the_allan_variance_at_every_tau(size: int) -> None:
-    rate = 500.0
-    n = np.array([1, 2, 10, 333])
-    means = allan_of_spectrum(lambda w: block_mean_spectrum(MODEL, w, rate, size), n)
-    assert means == pytest.approx(MODEL.allan_variance(n * size / rate, rate), rel=1e-7)
 
 
 @pytest.mark.parametrize("size", [1, 3, 8])
@@ -74,15 +65,11 @@ def test_a_common_process_keeps_its_signs() -> None:
     tau = np.array([1.0, 10.0])
     walk = 4.0 * NoiseModel(K=1.0).allan_variance(tau, 100.0)
     w = np.array([0.7, 0.3])
-    alone, common = board.allan_parts(tau).of_sum(np.tile(w, (2, 1))).T
+    alone, common = board.allan_parts(tau).of_sum(w)
     assert common == pytest.approx((0.7e-3 - 0.6e-3) ** 2 * walk)
     assert alone == pytest.approx(
         0.49 * MODEL.allan_variance(tau, 100.0) + 0.09 * MODEL.allan_variance(tau, 200.0)
     )
-    spectra = board.spectral_parts([0.1])
-    assert spectra.own[0, 1] == block_mean_spectrum(MODEL, np.array([0.1]), 200.0, 2)[0]
-    delayed = spectra.of_sum(np.array([[1.0, 0.5j]]))
-    assert delayed[0, 1] == pytest.approx(spectra.shared[0, 0] * 2e-6)
 
 
 def test_a_tau_below_half_a_sample_is_one_sample() -> None:

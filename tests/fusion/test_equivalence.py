@@ -94,7 +94,7 @@ def test_a_floor_takes_more_and_at_last_no_number() -> None:
 def test_that_many_on_a_board_reach_the_better_sensor(common: dict[str, float]) -> None:
     wanted = float(FLICKER.allan_variance(30.0)) / 7.3
     board = Board.alike(FLICKER, 1, 1000.0, common)
-    own, floor = board.allan_parts([30.0]).of_sum(np.ones((1, 1)))[0]
+    own, floor = (float(part[0]) for part in board.allan_parts([30.0]).of_sum(np.ones(1)))
     n = float(compute_number_needed(own, floor, wanted))
     assert n >= 7.3 * (1 - 1e-9)
     for number, enough in ((math.floor(n), False), (math.ceil(n), True)):

@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.extensions.fusion.fusion import Grade, yield_grade_rows
+from imubench_pipeline.extensions.fusion.fusion import yield_grade_rows
 from imubench_pipeline.navigation.ratios import ComparedChannel
-from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.tables.files import build
 from tests.conftest import catalogue
 
@@ -33,7 +32,7 @@ def channel(
 
 
 def rows_of(*channels: ComparedChannel, grade: str = "stim300") -> dict[tuple[str, str], Any]:
-    grades = [Grade(grade, grade, CATALOGUE[grade].datasheet)]
+    grades = {grade: CATALOGUE[grade]}
     rows = build("grades", yield_grade_rows(channels, grades)).to_pylist()
     return {(row["option"] or "", row["statistic"]): row for row in rows}
 
@@ -69,5 +68,4 @@ def test_the_middle_axis_answers_and_a_measured_log_before_a_simulated() -> None
 
 
 def test_a_grade_is_not_held_against_itself() -> None:
-    grades = [Grade("cheap", "V cheap", Datasheet.model_validate({"gyro": {}}))]
-    assert list(yield_grade_rows([channel(0.1, 1.0)], grades)) == []
+    assert list(yield_grade_rows([channel(0.1, 1.0)], {"cheap": CATALOGUE["stim300"]})) == []

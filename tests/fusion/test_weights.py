@@ -6,10 +6,11 @@ from scipy.optimize import minimize
 
 from imubench_pipeline.extensions.fusion.board import Board, Parts, Shared
 from imubench_pipeline.extensions.fusion.weights import (
-    ByFrequency,
     Constant,
+    at_fused_rate,
     best_constant,
     equal,
+    fuse,
     least,
 )
 from imubench_pipeline.noise import NoiseModel
@@ -30,20 +31,10 @@ def test_no_other_constant_weights_have_a_lower_allan_variance(shared: tuple[Sha
     parts = board.allan_parts([30.0])
 
     def variance(two: np.ndarray) -> float:
-        w = np.array([[*two, 1.0 - two.sum()]])
-        return float(parts.of_sum(w).sum()) * 1e9
+        return float(np.sum(parts.of_sum(np.array([*two, 1.0 - two.sum()])))) * 1e9
 
     found = minimize(variance, [0.3, 0.3], method="Nelder-Mead", options={"xatol": 1e-9})
     assert best_constant(board, 30.0).values[:2] == pytest.approx(found.x, abs=1e-4)
-
-
-def test_the_weights_by_frequency_are_the_inverse_spectra() -> None:
-    omega = np.geomspace(1e-7, np.pi, 50)
-    weights = ByFrequency(BOARD).response(omega)
-    spectra = BOARD.spectral_parts(omega).own
-    assert weights == pytest.approx((1 / spectra) / (1 / spectra).sum(axis=1, keepdims=True))
-    assert weights[-1, 1] == pytest.approx(1 / 19, rel=1e-3)  # as for white noise
-    assert weights[0, 1] == pytest.approx(1.0, abs=1e-2)  # one sensor does not walk
 
 
 @given(st.floats(-12.0, 12.0), st.integers(0, 1000))
@@ -96,3 +87,18 @@ def test_no_sensors_have_no_weights() -> None:
 def test_a_sensor_without_noise_is_refused() -> None:
     with pytest.raises(ValueError, match="without noise"):
         best_constant(Board([GOOD, NoiseModel(K=1e-6)], [1.0, 1.0]))
+
+
+TWO_RATES = Board([NoiseModel(N=1e-4)] * 2, [100.0, 200.0])
+
+
+def test_a_faster_sensor_is_brought_to_the_fused_rate_by_means_of_blocks() -> None:
+    found = at_fused_rate(TWO_RATES, [np.array([1.0, 2.0]), np.array([1.0, 3.0, 5.0, 9.0, 4.0])])
+    assert found.tolist() == [[1.0, 2.0], [2.0, 7.0]]
+
+
+@pytest.mark.parametrize("logs", [1, 3])
+def test_a_wrong_number_of_logs_is_said(logs: int) -> None:
+    samples = [np.zeros(8)] * logs
+    with pytest.raises(ValueError, match=f"found samples of {logs} sensors, expected 2"):
+        fuse(TWO_RATES, equal(2), samples)

@@ -80,7 +80,7 @@ def test_recordings_of_noise_are_measurements(tmp_path: Path, si: Columns, kind:
     held = {"Gyr_noise": three(si, "gyro"), "Acc_noise": three(si, "accel"), "t": si["time"]}
     WRITERS[kind](tmp_path / "a", held)
     drafted(tmp_path / "a", dict(list(si.items())[:7]), gyro="rad/s")
-    # Beside the samples they are what a data sheet or a filter says.
+    # Beside the samples they are what a datasheet or a filter says.
     held |= {"gyro": -held["Gyr_noise"], "acc": -held["Acc_noise"]}
     WRITERS[kind](tmp_path / "b", held)
     truth = {name: -values if name != "time" else values for name, values in si.items()}

@@ -92,7 +92,7 @@ def test_a_term_that_says_it_wrong_is_refused(kinds: tuple[type[Term], ...], wha
         register_terms(*kinds)
 
 
-@pytest.mark.parametrize("name", ["symbol", "label", "standard_name", "word", "role", "states"])
+@pytest.mark.parametrize("name", ["symbol", "label", "standard_name", "word", "role"])
 def test_a_term_that_says_nothing_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(WhiteNoise, name)
     with pytest.raises(TypeError, match=f"WhiteNoise lacks the class variable {name}"):

@@ -229,10 +229,10 @@ def test_rates_of_one_clock_alone_are_those_of_its_channels() -> None:
     ("sensor", "limit", "words"),
     [
         (None, 30.0, "of any gyro"),
-        (printing(offset={"value": 1, "unit": "deg/s"}), 4.0, "by its data sheet"),
-        (printing(offset={"value": 2, "unit": "deg/s", "kind": "max"}), 3.0, "by its data sheet"),
-        (printing(offset={"value": 30, "unit": "deg/h"}), 2.0, "by its data sheet"),
-        (printing(offset={"value": 20, "unit": "deg/s"}), 30.0, "by its data sheet"),
+        (printing(offset={"value": 1, "unit": "deg/s"}), 4.0, "by its datasheet"),
+        (printing(offset={"value": 2, "unit": "deg/s", "kind": "max"}), 3.0, "by its datasheet"),
+        (printing(offset={"value": 30, "unit": "deg/h"}), 2.0, "by its datasheet"),
+        (printing(offset={"value": 20, "unit": "deg/s"}), 30.0, "by its datasheet"),
         (parse(Sensor, SENSOR | {"price_class": "tactical, IMU"}, "s"), 2.0, "class tactical"),
     ],
 )

@@ -66,7 +66,10 @@ def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
     assert drawn.keys() == {("one", "gyro_x")}
     assert page["window"] == 10.0  # of the requirement
     (robot,) = page["requirements"]
-    assert robot == {"title": "a robot", "sensors": {"one": "meets if …, margin 0.25, likely 0.9"}}
+    assert robot == {
+        "title": "a robot",
+        "sensors": {"one": "meets if …, margin 0.25, likely margin 0.9"},
+    }
 
 
 def test_the_page_is_written_again_when_what_is_kept_changes(tmp_path: Path) -> None:

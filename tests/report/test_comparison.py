@@ -36,15 +36,15 @@ def test_each_quantity_has_a_table_with_the_channels_of_all_sensors() -> None:
     assert gyro["filters"] == {
         "axis": ["x", "y"],
         "sensor": ["Vendor A", "Vendor B"],
-        "method": ["recommended", "papers' model"],
+        "method": ["recommended", "model N+GM+K"],
     }
     assert accel["filters"]["sensor"] == ["Vendor A"]
     seen = [(line["view"].sensor, line["channel"], line["asked"]) for line in gyro["lines"]]
     assert seen == [
         ("a", "gyro_x", "recommended"),
-        ("a", "gyro_x", "papers' model"),
+        ("a", "gyro_x", "model N+GM+K"),
         ("b", "gyro_y", "recommended"),
-        ("b", "gyro_y", "papers' model"),
+        ("b", "gyro_y", "model N+GM+K"),
     ]
     assert [line["view"].simulated for line in gyro["lines"]] == [False, False, True, True]
 

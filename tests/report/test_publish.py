@@ -262,7 +262,7 @@ def test_pages_mark_simulated_recordings_as_simulated(
     assert (
         "Simulated from known parameters, not measured" in read["recordings/two/phantom.html"].text
     )
-    assert "All are simulated" in read["sensors/two.html"].text
+    assert "It is simulated" in read["sensors/two.html"].text
 
 
 def test_what_is_measured_is_not_called_simulated(read: dict[str, Read]) -> None:

@@ -205,7 +205,7 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
     )
     assert summarise_recordings(views[1:2], several=False) == (
         "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed, 0 rejected. "
-        "All are simulated, not measured."
+        "It is simulated, not measured."
     )
     assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
 

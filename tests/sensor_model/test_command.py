@@ -59,7 +59,7 @@ def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys)
         assert simulate(sensor, *given, "--out", path) == 0
         said = capsys.readouterr().out
         assert said.startswith("SIMULATED by imubench, not measured: 4,000 samples")
-        assert "assumed: " in said and "data sheet" in said
+        assert "assumed: " in said and "datasheet" in said
         found[suffix] = ingested(path, sensor, tmp_path / suffix)
         path.with_suffix(".yaml").unlink()
     assert set(found["csv"]) == set(found["parquet"]) >= {"gyro_x"}
@@ -77,7 +77,7 @@ def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> Non
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
     assert path.read_text().startswith(
-        "# SIMULATED by imubench, not measured\n# from the data sheet of bno055"
+        "# SIMULATED by imubench, not measured\n# from the datasheet of bno055"
     )
 
 

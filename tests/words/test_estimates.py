@@ -107,8 +107,8 @@ def test_a_percentage_never_hides_that_an_interval_is_wide(
     [
         ("N+GM+K", "N+GM+K"),
         ("N", "N"),
-        ("N+F+S", "N+F + 1 line"),
-        ("N+F+S+S+S", "N+F + 3 lines"),
+        ("N+F+S", "N+F + 1 spectral line"),
+        ("N+F+S+S+S", "N+F + 3 spectral lines"),
     ],
 )
 def test_lines_of_a_model_are_counted(name: str, text: str) -> None:

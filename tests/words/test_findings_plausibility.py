@@ -42,7 +42,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     ),
     (
         SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL, printed=True),
-        ["expected 0.0005 to 0.06 by its data sheet", "in deg/s, and not rad/s"],
+        ["expected 0.0005 to 0.06 by its datasheet", "in deg/s, and not rad/s"],
     ),
     (
         SuspiciousUnit("g", "m/s^2", 1.0 / 9.80665, gravity=96.17),
@@ -67,9 +67,9 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     (AxisUnlike(("gyro_x", "gyro_y"), 6.0, 0.3 * DEG, "deg/s", None), ["differ so much. Check"]),
     (Turning(-31.0 * DEG, largest=30.0 * DEG), ["is −31 °/s, above", "of any gyro (30 °/s)"]),
     (
-        Turning(-6.4 * DEG, largest=4.5 * DEG, offset_of="data sheet"),
+        Turning(-6.4 * DEG, largest=4.5 * DEG, offset_of="datasheet"),
         [
-            "is −6.4 °/s, above the largest plausible offset by its data sheet (4.5 °/s)",
+            "is −6.4 °/s, above the largest plausible offset by its datasheet (4.5 °/s)",
             "unit is wrong",
         ],
     ),

@@ -192,28 +192,33 @@ EXPORTS = [
 ]
 
 SIMULATIONS = [
-    of(simulations.of_data_sheet, "data sheet of s: sheet 1", "s", "sheet 1"),
-    of(simulations.of_data_sheet, "the data sheet of s", "s", None),
+    of(simulations.of_data_sheet, "datasheet of s: sheet 1", "s", "sheet 1"),
+    of(simulations.of_data_sheet, "the datasheet of s", "s", None),
     of(
         simulations.printed_figure,
-        "N 0.01 dps: typ, data sheet (why)",
+        "N 0.01 dps: typ, datasheet (why)",
         "N",
         0.01,
         "dps",
         "typ",
         "why",
     ),
-    of(calibration.printed_noise, "not measured", simulations.of_data_sheet("s", None)),
-    of(calibration.static_noise, "static recording r; method likelihood", "r", "likelihood"),
+    of(calibration.describe_printed_noise, "not measured", simulations.of_data_sheet("s", None)),
     of(
-        calibration.static_noise,
+        calibration.describe_static_noise,
+        "static recording r; method likelihood",
+        "r",
+        "likelihood",
+    ),
+    of(
+        calibration.describe_static_noise,
         "of another device, 8, simulated, of its gyro y, as gyro x has",
         *("r", "likelihood"),
         device="8",
         simulated=True,
         channels=("gyro_y", "gyro_x"),
     ),
-    of(calibration.several_segments, "2 segments", 2),
+    of(calibration.explain_segments, "2 segments", 2),
     of(simulations.nothing_to_simulate, "no term has a value: a; b", ["a", "b"]),
     of(simulations.no_model_explains, "spectrum of gyro x", "gyro_x"),
 ]

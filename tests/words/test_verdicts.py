@@ -78,7 +78,7 @@ def test_every_source_of_errors_has_a_name(source: SourceCode) -> None:
     [
         (figure, quantity)
         for figure, quantity in product(get_args(Cause), ("gyro", "accel"))
-        # An accelerometer has no g-sensitivity, and no data sheet prints the square.
+        # An accelerometer has no g-sensitivity, and no datasheet prints the square.
         if (figure, quantity) != ("g_sensitivity", "accel") and figure != "temperature_squared"
     ],
 )
@@ -186,8 +186,8 @@ def test_an_excluded_sensor_has_its_shortfalls() -> None:
 @pytest.mark.parametrize(
     ("origin", "words"),
     [
-        ("measured", " (measured)"),
-        ("datasheet", " (datasheet)"),
+        ("measured", " (measured value)"),
+        ("datasheet", " (datasheet value)"),
         ("class limit", " (assumed worst value)"),
         ("requirement", ""),
     ],
@@ -206,7 +206,7 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("misalignment", "gyro", share=0.1, origin="class limit"),
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
-    assert origins_text(shares) == "assumed worst value 60 %, noise 35 %, datasheet 5 %"
+    assert origins_text(shares) == "assumed worst figures 60 %, noise 35 %, datasheet figures 5 %"
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_a_class_limit_is_named(
 
 def test_margins_other_than_in_use() -> None:
     both = row(margin=0.5, noise_margin=4.234, likely_margin=0.9)
-    assert other_margins_text(both) == "noise alone 4.23, likely 0.9"
+    assert other_margins_text(both) == "noise alone 4.23, likely margin 0.9"
     # Where every figure is known, the likely margin is the margin in use.
     assert other_margins_text(replace(both, likely_margin=0.5)) == "noise alone 4.23"
     assert other_margins_text(row()) == ""
@@ -338,9 +338,10 @@ def test_one_sentence_names_the_sensors_to_choose() -> None:
         "Bus": row(),
     }
     assert summary_text(best, NAMES) == (
-        "A meets Rover and Bus. B likely meets Boat. "
-        "B meets Drone if 2 unknown figures are good enough. No sensor meets Car or Truck. "
-        "No sensor is shown to meet Train. No sensor can be judged for Ship."
+        "A meets the limits of Rover and Bus. B likely meets the limits of Boat. "
+        "B meets the limits of Drone if 2 unknown figures are good enough. "
+        "No sensor meets the limits of Car or Truck. "
+        "No sensor is shown to meet the limits of Train. No sensor can be judged for Ship."
     )
 
 

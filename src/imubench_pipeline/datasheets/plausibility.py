@@ -106,7 +106,7 @@ class Expected:
 
     noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
     offset: float = _MAX_OFFSET  # largest mean of a gyro that an offset explains, rad/s
-    offset_of: str | None = None  # "data sheet" or the price class that limits it; None: any gyro
+    offset_of: str | None = None  # "datasheet" or the price class that limits it; None: any gyro
     bandwidth: float | None = None  # the widest that is printed, Hz
     printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
 
@@ -146,7 +146,7 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     ]
     if printed:
         largest = min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET)
-        return largest, "data sheet"
+        return largest, "datasheet"
     words = (sensor.price_class or "").lower().replace(",", " ").split()
     word = next((word for word in words if word in _MAX_OFFSET_OF_CLASS), None)
     if word is None:

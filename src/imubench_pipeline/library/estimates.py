@@ -177,7 +177,6 @@ class Estimates(ByChannel[ChannelEstimate]):
         rate: float | None = None,
         inflation: float = 1.0,
         because: str | None = None,
-        latitude: float | None = None,
     ) -> str | bytes:
         """Return the input file of a filter or simulator, as `imubench export` writes it.
 
@@ -200,8 +199,6 @@ class Estimates(ByChannel[ChannelEstimate]):
             Factor on every deviation, with its reason ``because``.
         because : str, optional
             Reason of the inflation, or of the use of an unfit log.
-        latitude : float, optional
-            For gravity, degrees.
 
         Raises
         ------
@@ -214,7 +211,6 @@ class Estimates(ByChannel[ChannelEstimate]):
             "inflation": inflation,
             "because": because,
             "mode": mode,
-            "latitude": latitude,
             "rate": rate,
         }
         content: str | bytes = find_function("export_estimates")(self, target, path, options)

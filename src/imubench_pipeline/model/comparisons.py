@@ -1,4 +1,4 @@
-"""Sensors compared: with their data sheets, over time, with each other and with requirements."""
+"""Sensors compared: with their datasheets, over time, with each other and with requirements."""
 
 from typing import Annotated
 
@@ -266,7 +266,7 @@ class NextStepRow(SensorRow):
     requirements: Annotated[tuple[str, ...], "requirements with verdicts that it can change"]
     action: Annotated[states.Action, "what to do"]
     quantities: Annotated[tuple[str, ...], "quantities with the unit or axes concerned"] = ()
-    figures: Annotated[tuple[Condition, ...], "figures to look up in data sheets"] = ()
+    figures: Annotated[tuple[Condition, ...], "figures to look up in datasheets"] = ()
     doubts: Annotated[tuple[DoubtMark, ...], "doubts that it removes"] = ()
     verdicts_turned: Annotated[int, "number of verdicts that it can change or settle"]
     verdicts_strengthened: Annotated[int, "number of verdicts with stronger evidence"]

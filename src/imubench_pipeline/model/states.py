@@ -44,7 +44,7 @@ Verdict = Literal[
 
 A figure that is not known counts as the worst of its class. ``meets_if``: it fails so, and meets
 the limit on the conditions beside it; ``cannot_meet``: it fails even with the best of its class, by
-its data sheet. ``excluded``: it lacks a property that the requirement demands.
+its datasheet. ``excluded``: it lacks a property that the requirement demands.
 """
 
 SURE_PROBABILITY = 0.975

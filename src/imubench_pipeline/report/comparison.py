@@ -71,12 +71,14 @@ def make_parameter_cell(
     unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     rows = [row for row in rows if row.status != "absent"] or rows
+    terms = [term for term in rows[0].model.split("+") if term in ("F", "GM")] if rows else []
     parts = [
         _part(
             row.value,
             None if row.status == "absent" else row.lower,
             row.upper,
             "" if row.status == "ok" else row.status,
+            terms[row.component - 1] if len(rows) > 1 else "",
         )
         for row in rows
     ]
@@ -86,9 +88,9 @@ def make_parameter_cell(
 
 
 def _part(
-    value: float | None, lower: float | None, upper: float | None, status: str
+    value: float | None, lower: float | None, upper: float | None, status: str, term: str = ""
 ) -> payload.Json:
-    return {"value": value, "lower": lower, "upper": upper, "status": status}
+    return {"value": value, "lower": lower, "upper": upper, "status": status, "term": term}
 
 
 def _cell(parts: Sequence[payload.Json], words: str, digits: int) -> payload.Json:
@@ -114,7 +116,7 @@ def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
         shown = select_symbols(chain(*channel.parameters.values()))
         methods = {channel.recommended: "recommended"}
         if _PAPERS_METHOD in channel.parameters:
-            methods.setdefault(_PAPERS_METHOD, "papers' model")
+            methods.setdefault(_PAPERS_METHOD, "model N+GM+K")
         lines[channel.quantity] += [
             {
                 "view": view,

@@ -126,6 +126,7 @@ def compare_sensors_with_datasheets(
                     "difference": _format_range([*map(_format_percent, (deltas[0], deltas[-1]))]),
                 }
             )
+        time = first.condition if first.statistic == "adev" else None
         differ = len({one["measured"] for one in readings}) > 1
         yield {
             "sensor": sensor,
@@ -136,7 +137,7 @@ def compare_sensors_with_datasheets(
             "channel": channel,
             "quantity": _name_figure(first),
             "printed": format_printed(first),
-            "about": first.kind or "",
+            "about": ", ".join(filter(None, (first.kind, time))),
             "unit": unit.sign,
             "readings": readings,
             "delta": median(_list_deltas(next(iter(by_reading.values())))),
@@ -176,7 +177,9 @@ def format_repeatability(
 
 
 def _name_figure(row: DatasheetRow) -> str:
-    return _STATISTIC_NAMES.get(row.statistic, row.quantity.replace("_", " "))
+    return _STATISTIC_NAMES.get(row.statistic, row.quantity.replace("_", " ")).replace(
+        "allan", "Allan"
+    )
 
 
 def _name_reading(row: DatasheetRow) -> str:

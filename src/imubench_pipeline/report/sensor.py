@@ -146,9 +146,12 @@ def _make_sensor_context(
 def _list_verdicts(site: Site, sensor: str) -> Iterator[tuple[str, Verdict]]:
     """Yield the name of each requirement, and the verdict on a sensor."""
     rows = site.rows(comparisons.RankingRow)
-    stated = {row.requirement: row.verdict for row in rows if row.sensor == sensor and row.decides}
+    deciding = {row.requirement: row for row in rows if row.sensor == sensor and row.decides}
     for name in site.settings["requirements"] if rows else ():
-        yield name.replace("_", " "), stated.get(name, "not_enough_data")
+        title, row = name.replace("_", " "), deciding.get(name)
+        if row and row.shortfalls:
+            title += f" ({'; '.join(map(verdicts.shortfall_text, row.shortfalls))})"
+        yield title, row.verdict if row else "not_enough_data"
 
 
 def _choose_recording(

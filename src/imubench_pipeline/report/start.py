@@ -357,8 +357,10 @@ def describe_simulated(views: Sequence[RecordingView]) -> str:
     number = sum(view.simulated for view in views)
     if not number:
         return ""
-    of_them = f"{number} of them {'is' if number == 1 else 'are'}"
-    return f"{'All are' if number == len(views) else of_them} simulated, not measured."
+    if number == len(views):
+        all_of_them = "All recordings are" if number > 1 else "It is"
+        return f"{all_of_them} simulated, not measured."
+    return f"{number} of them {'is' if number == 1 else 'are'} simulated, not measured."
 
 
 def fold_reason(reason: str | None) -> tuple[str, str]:
@@ -425,9 +427,9 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
     """Yield the deciding limit of the best sensor, its data, and the verdicts on the others."""
     for group in ranked[:1]:
         decides = next(limit for limit in group.limits if limit.decides)
-        text = Markup("Deciding limit: {}. Expected error {}{}, allowed {} (1σ).").format(
-            decides.limit, decides.sigma, decides.parenthesis, decides.allowed
-        )
+        text = Markup(
+            "Deciding limit: {}. Expected error {}{}, allowed {} (the limit as 1σ)."
+        ).format(decides.limit, decides.sigma, decides.parenthesis, decides.allowed)
         if decides.reason:
             text += f" Not counted: {decides.reason}."
         yield text + f" {_describe_data(site, group.row)}"  # still markup

@@ -37,7 +37,7 @@ _ROWS_OF_CHANNELS = (
 METHOD_NAMES = {
     "robust": "robust fit",
     "likelihood": "likelihood",
-    "likelihood_gm": "likelihood, papers' model",
+    "likelihood_gm": "likelihood, model N+GM+K",
     "compensated": "temperature compensated",
     "curve": "read from the curve",
     "paper": "fit, weights as printed",

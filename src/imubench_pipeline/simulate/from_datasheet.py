@@ -136,7 +136,7 @@ class _Printed:
             if step is not None and len(ranges) > 1:
                 # The printed sensitivity belongs to the range that it gives with a 16-bit register.
                 chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _STEPS_PER_SIDE)))))
-            text = f"full scale {number_text(values[chosen])} {figure.unit}: data sheet"
+            text = f"full scale {number_text(values[chosen])} {figure.unit}: datasheet"
             self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
                 self._assume("register", f"range {number_text(values[chosen])} {figure.unit}")

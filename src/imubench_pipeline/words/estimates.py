@@ -85,4 +85,4 @@ def model_text(name: str) -> str:
     terms = name.split("+")
     lines = terms.count("S")
     rest = "+".join(term for term in terms if term != "S")
-    return f"{rest} + {numbers.counted(lines, 'line')}" if lines else rest
+    return f"{rest} + {numbers.counted(lines, 'spectral line')}" if lines else rest

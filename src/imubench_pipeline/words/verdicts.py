@@ -133,7 +133,12 @@ _PROPERTIES: Mapping[verdicts.Property, tuple[str, str, str]] = {
 _FULL_SCALES = {"gyro": ("deg/s", "angular_rate"), "accel": ("g", "acceleration")}
 
 _UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
-    "gyro": ((math.radians(1.0), "°/s, not rad/s"), (math.degrees(1.0), "rad/s, not °/s")),
+    "gyro": (
+        (math.radians(1.0), "°/s, not rad/s"),
+        (math.degrees(1.0), "rad/s, not °/s"),
+        (1e-3 * math.degrees(1.0), "mrad/s, not °/s"),
+        (1e3 * math.radians(1.0), "°/s, not mrad/s"),
+    ),
     "accel": (
         (STANDARD_GRAVITY, "g, not m/s²"),
         (1.0 / STANDARD_GRAVITY, "m/s², not g"),
@@ -233,7 +238,7 @@ def shortfall_text(shortfall: verdicts.Shortfall) -> str:
 def share_text(share: verdicts.Share) -> str:
     """Return a source of an error with its share: ``gyro N 40 %``."""
     stated = share.is_noise or share.origin in (None, "requirement")
-    origin = "" if stated else f" ({_ORIGIN_WORDS[share.origin or 'measured']})"
+    origin = "" if stated else f" ({_ORIGIN_WORDS[share.origin or 'measured']} value)"
     return f"{source_text(share)}{origin} {100.0 * share.share:.0f} %"
 
 
@@ -242,7 +247,7 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
     parts: dict[str, float] = {}
     for share in shares:
         noise = share.is_noise and share.origin != "class limit"
-        name = "noise" if noise else _ORIGIN_WORDS[share.origin or "measured"]
+        name = "noise" if noise else f"{_ORIGIN_WORDS[share.origin or 'measured']} figures"
         parts[name] = parts.get(name, 0.0) + share.share
     largest_first = sorted(parts.items(), key=lambda part: -part[1])
     shown = [(name, round(100.0 * part)) for name, part in largest_first if part >= 0.005]
@@ -254,7 +259,7 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
 _ORIGIN_WORDS: Mapping[Origin, str] = {
     "measured": "measured",
     "datasheet": "datasheet",
-    "class limit": "assumed worst value",
+    "class limit": "assumed worst",
     "requirement": "stated",
 }
 """Origin of a figure in words."""
@@ -342,7 +347,7 @@ def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -
         parts.append(f"noise alone {number_text(row.noise_margin, 3)}")
     likely = number_text(row.likely_margin, 3)
     if row.likely_margin is not None and likely != number_text(row.margin, 3):
-        parts.append(f"likely {likely}")
+        parts.append(f"likely margin {likely}")
     return ", ".join(parts)
 
 
@@ -456,15 +461,15 @@ def summary_text(
         if row is None:
             key = "No sensor can be judged for", ""
         elif row.verdict in ("meets", "likely_meets"):
-            key = f"{name} {SHORT_VERDICTS[row.verdict]}", ""
+            key = f"{name} {VERDICT_WORDS[row.verdict]} of", ""
         elif row.verdict == "meets_if":
             number = len(row.conditions)
             end = f" if {counted(number, 'unknown figure')} {'is' if number == 1 else 'are'}"
-            key = f"{name} meets", f"{end} good enough"
+            key = f"{name} meets the limits of", f"{end} good enough"
         elif row.verdict in ("fails", "cannot_meet"):
-            key = "No sensor meets", ""
+            key = "No sensor meets the limits of", ""
         else:
-            key = "No sensor is shown to meet", ""
+            key = "No sensor is shown to meet the limits of", ""
         groups.setdefault(key, []).append(requirement)
     return " ".join(
         f"{of} {join_names(which, 'or' if of.startswith('No sensor') else 'and')}{end}."

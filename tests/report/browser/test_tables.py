@@ -134,7 +134,7 @@ def test_what_is_asked_of_tables_stands_in_the_address(read: Open, bench: Report
     bars[0].get_by_role("searchbox").fill("A-1")
     tables[0].get_by_role("button", name="Sort by K").click()
     tables[0].get_by_role("button", name="Sort by K").click()
-    bars[1].get_by_label("Method").select_option("papers' model")
+    bars[1].get_by_label("Method").select_option("model N+GM+K")
     before, link = [cells(table, 2) for table in tables], reader.page.url
     assert "gyroscope-parameters.find=A-1" in link
     reader.open("recordings.html")
@@ -157,7 +157,7 @@ def test_the_other_method_is_asked_for(read: Open, bench: Report) -> None:
     best = len(bench.of("fixed_bias", channel="gyro_x")) + 1
     assert len(cells(table, 1)) == best
     method = bar_of(table).get_by_label("Method")
-    method.select_option("papers' model")
+    method.select_option("model N+GM+K")
     assert len(cells(table, 1)) == best - 1  # one has it as its best
     method.select_option("all")
     assert count(table) == f"{2 * best - 1} rows"

@@ -8,7 +8,7 @@ from imubench_pipeline.registry import Block, Extension
 
 EXTENSION = Extension(
     name="aided",
-    needs=("exports",),
+    needs=("calibration", "exports"),
     tables="aided.tables",
     blocks=(Block("run", "navigate", "aided.settings:NavigateSettings"),),
     limits={"navigation": "aided.limits:yield_outage_rows"},

@@ -69,15 +69,10 @@ def _make_row(
             "% instead of 95"
         )
         return replace(unknown, reasons=(reason,))
-    found = {
-        "position": (run.position, run.position_lower, run.position_upper),
-        "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
-        "heading": (run.heading, run.heading_lower, run.heading_upper),
-    }[limit.error]
-    sizes = [size / _AXIS_FACTORS[limit.error] for size in found if size is not None]
-    if len(sizes) < len(found):
+    found = [getattr(run, f"{limit.error}{end}") for end in ("", "_lower", "_upper")]
+    if None in found:
         return replace(unknown, reasons=(f"the runs do not tell the error of the {limit.error}",))
-    sigma, lower, upper = sizes
+    sigma, lower, upper = (size / _AXIS_FACTORS[limit.error] for size in found)
     spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
     reason = "simulated drives; the limits are from the scatter of the runs, not from the estimate"
     return replace(

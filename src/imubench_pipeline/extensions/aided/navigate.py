@@ -43,6 +43,7 @@ from imubench_pipeline.extensions.aided.trajectories import (
     simulate_signals,
     simulate_trajectory,
 )
+from imubench_pipeline.extensions.calibration.noise_source import lend_axes
 from imubench_pipeline.extensions.exports.overbound import overbound
 from imubench_pipeline.extensions.exports.request import curve_of
 from imubench_pipeline.model.estimates import AllanRow, LowPassRow
@@ -90,12 +91,7 @@ _MAX_SHARE_ERROR = 0.05  # of a consistent filter, including two standard errors
 
 def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
     """Return models of all six channels; a missing axis takes one of the same quantity."""
-    whole = {}
-    for channel in CHANNELS:
-        own = [name for name in models if quantity_of(name) == quantity_of(channel)]
-        here = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
-        whole[channel] = models[here]
-    return whole
+    return {channel: models[lent] for channel, lent in lend_axes(models).items()}
 
 
 def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
@@ -430,23 +426,18 @@ def _describe_tuning(
         "tuning": name,
         "model": "; ".join(f"{quantity} {', '.join(own)}" for quantity, own in terms.items()),
         "outage": length,
-        "outages": sum(o.length == length for o in drive.outages) * len(outcome.errors),
+        "outages": 0 if length is None else len(drive.of_outages(length)) * len(outcome.errors),
         "states": outcome.states,
     }
     for error in ERRORS:
         of_runs = compute_mean_squares(drive, outcome, error, length)
-        size = compute_root_mean_square(of_runs)
-        row |= {error: size.value, f"{error}_lower": size.lower, f"{error}_upper": size.upper}
+        columns = [f"{error}{end}" for end in ("", "_lower", "_upper")]
+        row |= zip(columns, compute_root_mean_square(of_runs), strict=True)
         row[f"{error}_predicted"] = predict_root_mean_square(drive, outcome, error, length)
         if TRUE in outcomes:
-            against = compute_ratio(
-                of_runs, compute_mean_squares(drive, outcomes[TRUE], error, length)
-            )
-            row |= {
-                f"{error}_ratio": against.value,
-                f"{error}_ratio_lower": against.lower,
-                f"{error}_ratio_upper": against.upper,
-            }
+            others = compute_mean_squares(drive, outcomes[TRUE], error, length)
+            columns = [f"{error}_ratio{end}" for end in ("", "_lower", "_upper")]
+            row |= zip(columns, compute_ratio(of_runs, others), strict=True)
     # A bank of processes has none shorter than an epoch: its states are no true bias.
     of_bank = {quantity_of(c) for c, model in models.items() if "F" in model.name.split("+")}
     for group in GROUPS:

@@ -182,16 +182,15 @@ def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[tuple[int, Navigatio
 def describe_row(row: NavigationRow) -> NavigationLine:
     """Return a row as the page shows it."""
     inside, error = row.nees_inside, row.nees_error
-    position_ratio = (row.position_ratio, row.position_ratio_lower, row.position_ratio_upper)
     return NavigationLine(
         row=row,
         outage=_format_outage(row),
         signals=_SIGNAL_TEXTS[row.signals],
         tuning=TUNINGS[row.tuning],
-        position=_format_figure(row.position, row.position_lower, row.position_upper),
-        ratio=_format_figure(*position_ratio),
-        velocity=_format_figure(row.velocity, row.velocity_lower, row.velocity_upper),
-        heading=_format_figure(row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi),
+        position=_format_figure(row, "position"),
+        ratio=_format_figure(row, "position_ratio"),
+        velocity=_format_figure(row, "velocity"),
+        heading=_format_figure(row, "heading", 180.0 / math.pi),
         inside=""
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
@@ -204,12 +203,10 @@ def _format_outage(row: NavigationRow) -> str:
     return "none" if row.outage is None else f"{number_text(row.outage)} s"
 
 
-def _format_figure(
-    value: float | None, lower: float | None, upper: float | None, factor: float = 1.0
-) -> str:
-    if value is None:
+def _format_figure(row: NavigationRow, name: str, factor: float = 1.0) -> str:
+    """Return a column with its limits, if any."""
+    sizes = [getattr(row, f"{name}{end}") for end in ("", "_lower", "_upper")]
+    if sizes[0] is None:
         return "–"
-    text, low, high = (
-        number_text(None if size is None else factor * size, 3) for size in (value, lower, upper)
-    )
+    text, low, high = (number_text(None if one is None else factor * one, 3) for one in sizes)
     return text if low == high else f"{text} ({low} to {high})"

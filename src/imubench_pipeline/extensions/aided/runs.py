@@ -22,23 +22,15 @@ WARM_UP = 120.0  # time with GNSS before the evaluation begins, s
 RECOVERY_TIME = 40.0  # time with GNSS between two outages, s
 
 
-@dataclass(frozen=True)
-class Outage:
-    """No fix of GNSS after ``begin`` for ``length``, s."""
-
-    begin: float
-    length: float
-
-
-def schedule_outages(duration: float, lengths: Sequence[float]) -> list[Outage]:
-    """Return outages with these lengths, s, repeated until a run of this duration, s, ends."""
-    outages: list[Outage] = []
+def schedule_outages(duration: float, lengths: Sequence[float]) -> list[tuple[float, float]]:
+    """Return begin and length of outages, s, repeated until a run of this duration, s, ends."""
+    outages: list[tuple[float, float]] = []
     begin = WARM_UP
     while True:
         for length in lengths:
             if begin + length > duration:
                 return outages
-            outages.append(Outage(begin, length))
+            outages.append((begin, length))
             begin += length + RECOVERY_TIME
 
 
@@ -53,9 +45,9 @@ class Outcome:
 
 
 class Drive:
-    """A trajectory with outages, for runs of several tunings."""
+    """A trajectory for runs of several tunings, without fixes in outages: begin and length, s."""
 
-    def __init__(self, trajectory: Trajectory, outages: Sequence[Outage]) -> None:
+    def __init__(self, trajectory: Trajectory, outages: Sequence[tuple[float, float]]) -> None:
         self.trajectory = trajectory
         rate = trajectory.sampling
         self.every = max(round(rate * FIX_INTERVAL), 1)
@@ -69,14 +61,12 @@ class Drive:
         # An outage lasts from a fix to the first one after its end. If its length is not a multiple
         # of the period, the error at its exact end is interpolated between two epochs.
         self.period = self.every / rate
-        self.outages: list[Outage] = []
-        self.last_fixes: list[int] = []
-        for outage in outages:
-            last = int(np.searchsorted(self.times, outage.begin + 1e-9)) - 1
-            end = last + self._epochs(outage.length)
+        self._last_fixes: dict[float, list[int]] = {}  # before each outage, by its length
+        for begin, length in outages:
+            last = int(np.searchsorted(self.times, begin + 1e-9)) - 1
+            end = last + self._epochs(length)
             if end < len(self.times):
-                self.outages.append(outage)
-                self.last_fixes.append(last)
+                self._last_fixes.setdefault(length, []).append(last)
                 self.available[last + 1 : end + 1] = False
         heading = min(INITIAL_HEADING_SIGMA, trajectory.gnss.heading)
         attitude = [INITIAL_TILT_SIGMA, INITIAL_TILT_SIGMA, heading]
@@ -88,12 +78,8 @@ class Drive:
 
     def of_outages(self, length: float) -> NDArray[np.int64]:
         """Return the epochs of each outage of this length, s, shape (outages, epochs)."""
-        lasts = [
-            last
-            for outage, last in zip(self.outages, self.last_fixes, strict=True)
-            if outage.length == length
-        ]
-        return np.add.outer(np.array(lasts, dtype=np.int64), 1 + np.arange(self._epochs(length)))
+        lasts = np.array(self._last_fixes.get(length, []), dtype=np.int64)
+        return np.add.outer(lasts, 1 + np.arange(self._epochs(length)))
 
     def stacked(self, axes: Sequence[AxisStates]) -> StackedStates:
         """Return the states of six axes over the steps of this drive."""
@@ -154,13 +140,8 @@ ERRORS = {"position": [0, 1], "velocity": [3, 4], "heading": [8]}
 """Columns of the evaluated errors: horizontal position and velocity, and heading; m, m/s, rad."""
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A value with its 95 % limits."""
-
-    value: float
-    lower: float
-    upper: float
+Interval = tuple[float, float, float]
+"""A value with its 95 % limits, lower and upper."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +200,7 @@ def _compute_interval(value: float, relative: Array) -> Interval:
     runs = len(relative)
     spread = 0.5 * float(relative.std(ddof=1)) / math.sqrt(runs)
     factor = math.exp(float(t.ppf(0.975, runs - 1)) * spread)
-    return Interval(value, value / factor, value * factor)
+    return value, value / factor, value * factor
 
 
 def compute_nees_share(

@@ -13,6 +13,7 @@ import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.extensions.aided.strapdown import invert_mechanisation
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, matrix
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -138,29 +139,12 @@ def simulate_trajectory(name: str, duration: float, sampling: float) -> Trajecto
     velocity = np.column_stack(
         [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
     )
-    attitude = make_attitudes(motion.roll, motion.pitch, motion.course)
+    attitude = matrix(motion.roll, motion.pitch, motion.course)
     earth = EARTH_RATE * np.array([math.cos(DEFAULT_LATITUDE), 0.0, -math.sin(DEFAULT_LATITUDE)])
     position, rate, force = invert_mechanisation(
         np.zeros(3), velocity, attitude, 1.0 / sampling, earth
     )
     return Trajectory(position, velocity, attitude, rate, force, sampling, earth, gnss)
-
-
-def make_attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
-    """Return the matrices of angles in rad, shape (L, 3, 3): heading, then pitch, then roll."""
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    sh, ch = np.sin(heading), np.cos(heading)
-    rows = [
-        [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
-        [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
-
-
-def compute_headings(attitude: Array) -> Array:
-    """Return the headings of matrices in rad, shape (L,)."""
-    return np.arctan2(attitude[:, 1, 0], attitude[:, 0, 0])
 
 
 @dataclass(frozen=True)
@@ -235,7 +219,7 @@ def simulate_signals(
             log = simulate(model, rate, L * block, rng, true=motion, temperature=temperature)
             measured[i] = _average_blocks(log, block)
     rng = channel_rng(seed, *names, "gnss")
-    heading = compute_headings(trajectory.attitude[at])[:, None]
+    heading = euler_angles(trajectory.attitude[at])[:, 2:]
     exact = np.concatenate([trajectory.position[at], trajectory.velocity[at], heading], axis=1)
     given = np.isfinite(spread := trajectory.gnss.spread)
     fixes = exact + np.where(given, spread, 0.0) * rng.standard_normal(exact.shape)

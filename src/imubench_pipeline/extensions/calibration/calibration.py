@@ -1,7 +1,7 @@
 """Bias, scale factor or attitude of one recording with known rates or directions, as rows."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,27 +14,26 @@ from imubench_pipeline.extensions.calibration.alignment.fine import align
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.least_squares import (
-    Limits,
+    Estimated,
     NotObservable,
     NotObservableError,
 )
 from imubench_pipeline.extensions.calibration.noise_source import (
-    NO_MODEL,
     NoiseSource,
-    explain_segments,
     find_noise_source,
+    lend_axes,
+    load_noise_at_rest,
     take_printed_noise,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
-from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
+from imubench_pipeline.extensions.calibration.rate_table import calibrate, residuals
+from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_segments
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.settings import (
-    TRIAD,
     AtRest,
     InPositions,
     OnRateTable,
     SimulatedPositions,
-    SimulatedRest,
     SimulatedTable,
 )
 from imubench_pipeline.extensions.calibration.still import bias_at_rest
@@ -43,11 +42,10 @@ from imubench_pipeline.extensions.calibration.tables import (
     CalibrationPointRow,
     CalibrationRow,
 )
-from imubench_pipeline.extensions.earth_rate.outlook import load_noise_at_rest
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import load_logs
 from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
-from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
@@ -97,21 +95,26 @@ def make_calibration_tables(
         gyros = (name for name in [*logs, *metadata.unusable] if name.startswith("gyro_"))
         channel: str = declared.channel or next(gyros)
         key = Key(sensor, recording, channel)
+        run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
+        row = partial(CalibrationRow, **asdict(key), run=run)
         if channel not in logs:
-            run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
             reason = f"{channel} cannot be used; see the findings of the recording"
-            rows = _without(partial(CalibrationRow, **asdict(key), run=run), "not_shown", reason)
+            rows = _without(row, "not_shown", reason)
         else:
             source = find_noise_source(folder, static, key, stated)
-            begins, truth = metadata.begins, _truth(simulated, channel)
-            log = GyroLog(key, logs[channel], source, begins, truth)
-            if isinstance(declared, OnRateTable):
-                rows = _on_rate_table(log, declared)
-            else:
-                rows = _at_rest(log, declared)
-    for row in rows:
-        tables[row.table].append(row)
+            truth = _truth(simulated, channel)
+            log = GyroLog(key, logs[channel], source, metadata.begins, truth)
+            rows = _calibrate_gyro(row, log, declared)
+    for made in rows:
+        tables[made.table].append(made)
     return tables
+
+
+_EXPERIMENTS: Mapping[str, type[InPositions | OnRateTable | AtRest]] = {
+    "positions": InPositions,
+    "rate_table": OnRateTable,
+    "pointing": AtRest,
+}
 
 
 def _declared(
@@ -119,18 +122,10 @@ def _declared(
 ) -> InPositions | OnRateTable | AtRest:
     """Return the block in the notes of a log, or its equivalent for a simulated one."""
     if simulated is not None:
-        block = (
-            simulated.block(SimulatedPositions)
-            or simulated.block(SimulatedTable)
-            or simulated.block(SimulatedRest)
-        )
-        assert block is not None  # only recordings with one of them are calibrated
-        return block.declared
-    if "positions" in sections:
-        return InPositions.model_validate(sections["positions"])
-    if "rate_table" in sections:
-        return OnRateTable.model_validate(sections["rate_table"])
-    return AtRest.model_validate(sections["pointing"])
+        blocks = map(simulated.block, _EXPERIMENTS.values())
+        return next(block for block in blocks if block is not None)
+    key = next(key for key in _EXPERIMENTS if key in sections)
+    return _EXPERIMENTS[key].model_validate(sections[key])
 
 
 def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
@@ -156,17 +151,6 @@ class GyroLog:
     begins: float  # time of the first sample used, s from the first of the recording
     truth: Mapping[str, float]  # true figures of a simulation, SI
 
-    def start_row(self, run: str, pointing: Pointing | None) -> partial[CalibrationRow]:
-        """Return the columns that all rows of the table ``calibration`` share."""
-        row = partial(CalibrationRow, **asdict(self.key), run=run)
-        if self.source is not None:
-            row = partial(row, model=self.source.model.name, model_from=self.source.words)
-        if pointing is not None:
-            row = partial(row, earth_rate=pointing.rate, earth_rate_sigma=pointing.rate_sigma)
-            row = partial(row, latitude=pointing.latitude, heading=pointing.heading)
-            row = partial(row, elevation=pointing.elevation)
-        return row
-
 
 def _attitude(
     key: Key,
@@ -185,21 +169,20 @@ def _attitude(
         for name in _ANGLES:
             yield about(parameter=name, status=status, reason=reason)
 
-    missing = [name for name in TRIAD if name not in logs]
+    missing = [name for name in CHANNELS if name not in logs]
     if missing:
         reason = f"{', '.join(missing)} cannot be used; see the findings of the recording"
         yield from without("not_shown", reason)
         return
-    if any(len(logs[name].segments) > 1 for name in TRIAD):
-        yield from without("not_shown", explain_segments(logs[TRIAD[0]]))
+    if any(len(logs[name].segments) > 1 for name in CHANNELS):
+        yield from without("not_shown", explain_segments(len(logs[CHANNELS[0]].segments)))
         return
     at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
-        names = (*at_rest.select_axes("gyro"), *at_rest.select_axes("accel"))
-        models = [at_rest.models[name] for name in names]
+        models = [at_rest.models[name] for name in lend_axes(at_rest.models).values()]
         words = f"static recording {at_rest.recording}"
     else:
-        printed = [take_printed_noise(key.sensor, sensor, channel) for channel in TRIAD]
+        printed = [take_printed_noise(key.sensor, sensor, channel) for channel in CHANNELS]
         known = [source for source in printed if source is not None]
         if len(known) < 6:
             yield from without("no_model", NO_MODEL)
@@ -207,7 +190,7 @@ def _attitude(
         models, words = [source.model for source in known], known[0].words
     about = partial(about, model=models[0].name, model_from=words)
     try:
-        positions, means = _average_positions([logs[name] for name in TRIAD], declared)
+        positions, means = _average_positions([logs[name] for name in CHANNELS], declared)
         triad = Triad(
             gyros=models[:3],
             accelerometers=models[3:],
@@ -215,11 +198,8 @@ def _attitude(
             accelerometer_bias=parse_quantity(declared.accelerometer_bias, "acceleration"),
         )
         aligned, fine = align(means, triad, positions, Site(latitude=declared.latitude_si))
-    except NotObservableError as error:
-        yield from without("not_observable", str(error))
-        return
     except ValueError as error:
-        yield from without("too_short", str(error))
+        yield from without(_name_status(error), str(error))
         return
     for name, value, sigma in zip(
         _ANGLES, euler_angles(aligned.attitude[0]).tolist(), fine.sigma[-1].tolist(), strict=True
@@ -267,13 +247,29 @@ def _average_positions(
     return Positions(blocks, rotation(angles)), means
 
 
-def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
-    """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
-    pointing = declared.pointing
-    row = gyro.start_row("at_rest", pointing)
+def _calibrate_gyro(
+    row: partial[CalibrationRow], gyro: GyroLog, declared: OnRateTable | AtRest
+) -> Iterator[TableRow]:
+    """Yield the rows of a gyro, or the reason without them."""
+    axis = declared.axis if isinstance(declared, OnRateTable) else declared
+    pointing = None if axis is None else axis.pointing
+    if gyro.source is not None:
+        row = partial(row, model=gyro.source.model.name, model_from=gyro.source.words)
+    if pointing is not None:
+        row = partial(row, earth_rate=pointing.rate, earth_rate_sigma=pointing.rate_sigma)
+        row = partial(row, latitude=pointing.latitude, heading=pointing.heading)
+        row = partial(row, elevation=pointing.elevation)
     if len(gyro.log.segments) > 1:
-        yield from _without(row, "not_shown", explain_segments(gyro.log))
+        yield from _without(row, "not_shown", explain_segments(len(gyro.log.segments)))
         return
+    if isinstance(declared, OnRateTable):
+        yield from _on_rate_table(row, gyro, declared, pointing)
+    else:
+        yield from _at_rest(row, gyro, declared.pointing)
+
+
+def _at_rest(row: partial[CalibrationRow], gyro: GyroLog, pointing: Pointing) -> Iterator[TableRow]:
+    """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
     if gyro.source is None:
         yield from _without(row, "no_model", NO_MODEL)
         return
@@ -290,21 +286,15 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
         scatter=_finite(bias.p_value[0]),
         half_width=bias.bound,
     )
-    figure = partial(_figure, gyro, about)
-    limits, noise = bias.fixed_interval(), bias.fixed_noise_sigma
-    yield figure("bias", bias.fixed, bias.fixed_sigma, limits, noise)
-    limits, noise = bias.present_interval(), bias.present_noise_sigma
-    yield figure("present_bias", bias.present, bias.present_sigma, limits, noise)
+    yield _figure(gyro, about, "bias", bias.fixed)
+    yield _figure(gyro, about, "present_bias", bias.present)
     yield from _open(row, bias.not_observable)
 
 
-def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
+def _on_rate_table(
+    row: partial[CalibrationRow], gyro: GyroLog, declared: OnRateTable, pointing: Pointing | None
+) -> Iterator[TableRow]:
     """Yield scale factor and bias of a gyro on a rate table, or the reason without them."""
-    pointing = None if declared.axis is None else declared.axis.pointing
-    row = gyro.start_row("rate_table", pointing)
-    if len(gyro.log.segments) > 1:
-        yield from _without(row, "not_shown", explain_segments(gyro.log))
-        return
     try:
         schedule = _schedule(gyro, declared)
     except ValueError as error:
@@ -319,8 +309,7 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
     try:
         fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except ValueError as error:
-        status = "not_observable" if isinstance(error, NotObservableError) else "too_short"
-        yield from _without(row, status, str(error))
+        yield from _without(row, _name_status(error), str(error))
         return
     earth = 0.0 if pointing is None else pointing.rate
     rates = schedule.of_blocks(measured.blocks) + earth
@@ -332,7 +321,10 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
         rates=len(left.dwell),
         scatter=_finite(fit.line.p_value[0]) if fit.line.freedom else None,
     )
-    yield from _line(partial(_figure, gyro, about), fit)
+    for name in ("bias", "scale_factor", "quadratic", "asymmetry", "linearity"):
+        estimated: Estimated | None = getattr(fit, name)
+        if estimated is not None:
+            yield _figure(gyro, about, name, estimated)
     yield from _open(row, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
@@ -387,41 +379,20 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
     return Schedule.from_steps(steps, log.rate, settling=settling)
 
 
-def _line(figure: Callable[..., CalibrationRow], fit: Calibration) -> Iterator[CalibrationRow]:
-    """Yield the estimates of the line, and of its deviations."""
-    noise = float(fit.line.sigma[0])
-    yield figure("bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
-    sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
-    yield figure("scale_factor", fit.scale_factor, sigma, interval, sigma)
-    for name, term in (("quadratic", fit.quadratic), ("asymmetry", fit.asymmetry)):
-        if term is not None:
-            row = figure(name, term.value, term.sigma, term.interval(), term.sigma)
-            yield replace(row, chance=float(term.p_value[0]))
-    if (straight := fit.linearity) is not None:
-        sigma = float(straight.sigma[int(np.abs(straight.deviation[0]).argmax())])
-        row = figure("linearity", straight.value, sigma, straight.interval(), sigma)
-        yield replace(row, chance=float(straight.p_value[0]))
-
-
 def _figure(
-    gyro: GyroLog,
-    about: partial[CalibrationRow],
-    name: str,
-    value: Array,
-    sigma: float,
-    interval: Limits,
-    noise: float,
+    gyro: GyroLog, about: partial[CalibrationRow], name: str, estimated: Estimated
 ) -> CalibrationRow:
-    lower, upper = interval
+    chance = estimated.p_value
     return about(
         parameter=name,
-        value=float(value[0]),
-        lower=float(lower[0]),
-        upper=float(upper[0]),
+        value=float(estimated.value[0]),
+        lower=float(estimated.lower[0]),
+        upper=float(estimated.upper[0]),
         unit=UNITS[name],
         status="ok",
-        sigma=float(sigma),
-        sigma_noise=noise,
+        sigma=estimated.sigma,
+        sigma_noise=estimated.noise_sigma,
+        chance=None if chance is None else float(chance[0]),
         truth=gyro.truth.get(name),
     )
 
@@ -444,6 +415,10 @@ def _without(row: partial[CalibrationRow], status: str, reason: str) -> Iterator
     """Yield the rows of a run without estimates."""
     for name in _RUN_PARAMETERS[row.keywords["run"]]:
         yield row(status=status, reason=reason, parameter=name, unit=UNITS[name])
+
+
+def _name_status(error: ValueError) -> str:
+    return "not_observable" if isinstance(error, NotObservableError) else "too_short"
 
 
 def _finite(value: float) -> float | None:

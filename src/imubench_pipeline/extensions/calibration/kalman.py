@@ -37,7 +37,6 @@ _SINGULAR_TOLERANCE = (
 class Filtered:
     """Filtered estimates after each block, from the data up to its end."""
 
-    time: Array  # shape (b,); end of each block, s from the first sample of the first
     rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
     rate_sigma: Array  # shape (b,); its standard deviation, rad/s
     drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
@@ -68,17 +67,6 @@ class Filtered:
         return squares
 
 
-@dataclass(frozen=True)
-class Smoothed:
-    """Smoothed estimates of each block from all the data."""
-
-    rate: Array  # shape (runs,); estimated Earth's rate, rad/s: the last filtered value
-    rate_sigma: float  # its standard deviation, rad/s
-    drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
-    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
-    states: Array  # shape (runs, b, m + 2); as in `Filtered`
-
-
 class RateFilter:
     """The filter of one design: blocks and noise model. It filters any number of runs at once.
 
@@ -98,14 +86,9 @@ class RateFilter:
         if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
-        self._states = discretise_blocks(model, blocks, turn_on_bias)
+        states = discretise_blocks(model, blocks, turn_on_bias)
         start = np.array([[rate_sigma]])
-        self._filter = BlockFilter((self._states,), blocks.seen[:, None, None], start)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The m states of the gyro's error, see `states.BlockStates`; the rate is before them."""
-        return self._states.names
+        self._filter = BlockFilter((states,), blocks.seen[:, None, None], start)
 
     @property
     def rate_sigma(self) -> Array:
@@ -118,7 +101,6 @@ class RateFilter:
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots
         return Filtered(
-            self.blocks.end,
             states[:, :, 0],
             self.rate_sigma,
             states[:, :, -1],
@@ -129,8 +111,12 @@ class RateFilter:
             roots,
         )
 
-    def smooth(self, filtered: Filtered) -> Smoothed:
-        """Smooth the result of `run` (Rauch, Tung and Striebel), with square roots."""
+    def smooth(self, filtered: Filtered) -> tuple[Array, Array]:
+        """Smooth the drift in the result of `run` (Rauch, Tung and Striebel), with square roots.
+
+        Returned are the drift of each block from all the data, rad/s, shape (runs, b), and its
+        standard deviation, shape (b,). The smoothed rate is the last filtered one.
+        """
         states, root = filtered.states.copy(), self._filter.roots[-1]
         sigma = np.empty(len(self.blocks))  # of the drift at each block
         sigma[-1] = compute_deviation(root, -1)
@@ -151,5 +137,4 @@ class RateFilter:
             sigma[k] = compute_deviation(root, -1)
             forecast = filtered.states[:, k] @ transition.T
             states[:, k] += (states[:, k + 1] - forecast) @ gain.T
-        rate_sigma = float(self.rate_sigma[-1])
-        return Smoothed(states[:, -1, 0], rate_sigma, states[:, :, -1], sigma, states)
+        return states[:, :, -1], sigma

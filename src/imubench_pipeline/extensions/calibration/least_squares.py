@@ -7,12 +7,13 @@ model, not from the scatter, which contains little of the slow noise. The scatte
 (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if C and X are right.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
@@ -27,7 +28,7 @@ from imubench_pipeline.typing import Array
 _MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of a standard error by longer blocks
 _MAX_BLOCKS = 1024  # largest number of blocks in the test of a block length
 _MIN_SINGULAR_VALUE = 1e-8  # of independent whitened regressors of unit length
-CONFIDENCE_LEVEL = 0.95
+_CONFIDENCE_LEVEL = 0.95
 
 Quantity = Literal[
     "earth_rate", "bias", "heading", "scale_factor", "asymmetry", "quadratic", "linearity"
@@ -47,7 +48,25 @@ class NotObservableError(ValueError):
     """The data do not determine a requested quantity, however little noise they have."""
 
 
-Limits = tuple[Array, Array]
+@dataclass(frozen=True)
+class Estimated:
+    """A quantity in runs of one design, SI."""
+
+    value: Array  # shape (runs,)
+    sigma: float  # its standard error
+    noise_sigma: float  # the part by the noise model
+    lower: Array  # shape (runs,); 95 % limits
+    upper: Array
+    p_value: Array | None = None  # shape (runs,); of a value at least as large, by noise alone
+
+
+def make_estimated(
+    value: Array, sigma: float, noise_sigma: float | None = None, p_value: Array | None = None
+) -> Estimated:
+    """Return estimates, shape (runs,), of normal errors with their limits."""
+    noise_sigma = sigma if noise_sigma is None else noise_sigma
+    half = compute_half_width() * sigma
+    return Estimated(value, sigma, noise_sigma, value - half, value + half, p_value)
 
 
 @dataclass(frozen=True)
@@ -69,21 +88,13 @@ class Fit:
         """Probability of residuals at least as large if the model is right, shape (runs,)."""
         return np.asarray(chi2.sf(self.chi_squared, self.freedom))
 
-    def interval(self) -> Limits:
-        """Return confidence limits, by the noise model, shapes (runs, p)."""
-        return compute_limits(self.value, self.sigma)
 
+def compute_half_width(quantities: int = 1) -> float:
+    """Return half of a two-sided 95 % interval, in standard deviations.
 
-def compute_limits(value: Array, sigma: Array | float) -> Limits:
-    """Return the 95 % limits, lower and upper, of estimates with normal errors, in one unit."""
-    half = compute_half_width() * sigma
-    return value - half, value + half
-
-
-def compute_half_width(level: float = CONFIDENCE_LEVEL) -> float:
-    """Return half of a two-sided normal interval, in standard deviations, for a level in (0, 1)."""
-    if not 0 < level < 1:
-        raise ValueError(f"level is {level}, expected a number between 0 and 1")
+    By Bonferroni, the intervals of several quantities all cover them with this probability.
+    """
+    level = 1.0 - (1.0 - _CONFIDENCE_LEVEL) / quantities
     return float(norm.ppf(0.5 + level / 2.0))
 
 
@@ -91,8 +102,8 @@ class LeastSquares:
     """The estimator of one design: blocks, noise model and regressors of shape (b, p).
 
     The model has some noise in every sample. ``further``, shape (b, b), is added to the covariance
-    of the noise, (rad/s)^2; ``names`` of the regressors are for errors. Raises NotObservableError
-    if there are fewer blocks than regressors, or the regressors are collinear.
+    of the noise, (rad/s)^2. Raises NotObservableError if there are fewer blocks than regressors, or
+    the regressors are collinear.
     """
 
     def __init__(
@@ -102,12 +113,10 @@ class LeastSquares:
         regressors: Array,
         *,
         further: Array | None = None,
-        names: Sequence[str] = (),
     ) -> None:
-        listed = f" ({', '.join(names)})" if names else ""
         if len(blocks) < regressors.shape[1]:
             raise NotObservableError(
-                f"{len(blocks)} means cannot determine {regressors.shape[1]} parameters{listed}"
+                f"{len(blocks)} means cannot determine {regressors.shape[1]} parameters"
             )
         self._blocks = blocks
         covariance = block_mean_covariance(model, blocks)
@@ -117,10 +126,10 @@ class LeastSquares:
         white = solve_triangular(self._root, regressors, lower=True)
         length = np.linalg.norm(white, axis=0)
         if np.any(length == 0.0):
-            raise NotObservableError(f"a regressor is 0 throughout{listed}")
+            raise NotObservableError("a regressor is 0 throughout")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
         if values[-1] < _MIN_SINGULAR_VALUE:
-            raise NotObservableError(f"the data cannot separate these{listed}")
+            raise NotObservableError("the data cannot separate the parameters")
         self._basis = basis
         self._back = (turn.T / values) / length[:, None]
         self.covariance = self._back @ self._back.T
@@ -149,24 +158,36 @@ def choose_block_length(
 ) -> int:
     """Return the longest block, in samples, whose means keep the information of the samples.
 
-    Blocks are shortened by halves until a fourth of their length would lower no standard error by
-    0.1 %. There are 1,024 blocks at most, none longer than the longest dwell. ``regressors`` gives
-    the regressors of blocks, shape (b, p). Raises NotObservableError if they are collinear.
+    There are 1,024 blocks at most (see `halve_block_length`), none longer than the longest dwell.
+    ``regressors`` gives the regressors of blocks, shape (b, p). Raises NotObservableError if they
+    are collinear.
     """
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
 
-    @cache
-    def sigma(longest: int) -> Array:
-        blocks = experiment.blocks(longest)
+    def sigma(blocks: Blocks) -> Array:
         return LeastSquares(blocks, model, regressors(blocks)).sigma
 
-    while len(blocks := experiment.blocks(length)) < regressors(blocks).shape[1] and length > 1:
-        length //= 2
+    return halve_block_length(length, experiment, sigma, _MAX_BLOCKS)
+
+
+def halve_block_length(
+    length: int, experiment: Experiment, sigma: Callable[[Blocks], ArrayLike], max_blocks: int
+) -> int:
+    """Return a block length, in samples, halved until shorter blocks tell no more.
+
+    A fourth of the returned length would lower none of the standard errors ``sigma`` of the blocks
+    by 0.1 %, or would give more than ``max_blocks`` of them.
+    """
+
+    @cache
+    def of_length(longest: int) -> Array:
+        return np.asarray(sigma(experiment.blocks(longest)))
+
     while length > 1:
         shorter = max(length // 4, 1)
-        if len(experiment.blocks(shorter)) > _MAX_BLOCKS:
+        if len(experiment.blocks(shorter)) > max_blocks:
             break
-        if np.all(sigma(shorter) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length)):
+        if np.all(of_length(shorter) > (1.0 - _MAX_SIGMA_INCREASE) * of_length(length)):
             break
         length //= 2
     return length

@@ -4,24 +4,25 @@ The log of a turned gyro does not show its noise. The model is of the longest st
 the same sensor, and device if possible, or else of the typical figures of its datasheet.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
-from imubench_pipeline.extensions.calibration import reasons as texts
+from imubench_pipeline.extensions.calibration.reasons import (
+    describe_printed_noise,
+    describe_static_noise,
+)
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import Quality, find_static_recordings
-from imubench_pipeline.recordings.recording import ChannelLog
-from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
 
-NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
 _DRAW_SEED = 20260101  # each recording and channel has an independent stream
 
 
@@ -57,7 +58,7 @@ def take_static_noise(
             name = min(gyros, key=lambda name: (name != channel, name))
             every = {estimate.method: estimate for estimate in read_estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
-            source = texts.static_noise(
+            source = describe_static_noise(
                 row.recording,
                 best[name].method,
                 device=row.device if row.device != own.device else None,
@@ -68,6 +69,39 @@ def take_static_noise(
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, source, drawn)
     return None
+
+
+@dataclass(frozen=True)
+class NoiseAtRest:
+    """The noise of a sensor at rest."""
+
+    recording: str
+    rate: float  # Hz
+    models: dict[str, NoiseModel]  # by channel
+
+
+def load_noise_at_rest(folders: Sequence[Path]) -> NoiseAtRest | None:
+    """Return the noise of a sensor from its static recordings; None if none has an estimate."""
+    for row, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
+        best = read_recommended_estimates(folder / "parameters.parquet")
+        models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
+        if row.rate is not None and any(name.startswith("gyro_") for name in models):
+            return NoiseAtRest(row.recording, row.rate, models)
+    return None
+
+
+def lend_axes(channels: Collection[str]) -> dict[str, str]:
+    """Return the channel that gives each axis its model: itself, or another of its quantity.
+
+    A quantity without channels has none.
+    """
+    lent = {}
+    for channel in CHANNELS:
+        own = [name for name in channels if quantity_of(name) == quantity_of(channel)]
+        if own:
+            other = own["xyz".index(channel[-1]) % len(own)]
+            lent[channel] = channel if channel in own else other
+    return lent
 
 
 def find_noise_source(
@@ -93,9 +127,4 @@ def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource |
     if channel not in origin.imu.axes or not origin.imu.axes[channel].noise.N:
         return None
     model = origin.imu.axes[channel].noise
-    return NoiseSource(model, model, texts.printed_noise(origin.source))
-
-
-def explain_segments(log: ChannelLog) -> str:
-    """Return the reason why a log of several segments cannot be used as one."""
-    return texts.several_segments(len(log.segments))
+    return NoiseSource(model, model, describe_printed_noise(origin.source))

@@ -30,15 +30,14 @@ from imubench_pipeline.extensions.calibration.experiment import (
     block_means,
 )
 from imubench_pipeline.extensions.calibration.least_squares import (
-    CONFIDENCE_LEVEL,
+    Estimated,
     Fit,
     LeastSquares,
-    Limits,
     NotObservable,
     NotObservableError,
     choose_block_length,
     compute_half_width,
-    compute_limits,
+    make_estimated,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.schedule import Schedule
@@ -50,188 +49,135 @@ _RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up
 
 
 @dataclass(frozen=True)
-class Term:
-    """A further term of the line, in runs of one design."""
-
-    value: Array  # shape (runs,); quadratic term, s/rad, or asymmetry, over scale factor
-    sigma: float  # its standard error by the noise model
-
-    @property
-    def p_value(self) -> Array:
-        """Probability of a value at least as far from 0 if the line is right, shape (runs,)."""
-        return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
-
-    def interval(self) -> Limits:
-        """Return confidence limits, shapes (runs,)."""
-        return compute_limits(self.value, self.sigma)
-
-
-@dataclass(frozen=True)
-class Linearity:
-    """The largest deviation of a rate from the line, over full scale, in runs of one design."""
-
-    deviation: Array  # shape (runs, levels); deviation of each rate from the line, over full scale
-    sigma: Array  # shape (levels,); its standard error by the noise model
-    full_scale: float  # the largest rate of the test, rad/s
-    p_value: Array  # shape (runs,); of deviations at least as large in total
-
-    @property
-    def value(self) -> Array:
-        """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
-        return np.abs(self.deviation).max(axis=1)
-
-    def interval(self) -> Limits:
-        """Return limits of the largest true deviation, shapes (runs,), by Bonferroni."""
-        half = compute_half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
-        size = np.abs(self.deviation)
-        return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
-
-
-@dataclass(frozen=True)
 class Calibration:
     """Bias and scale factor in runs of one design."""
 
     line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
-    bias_sigma: float  # of the bias, with the Earth's rate along the axis, rad/s
-    quadratic: Term | None  # coefficient of the square of the rate, in addition to the line, s/rad
-    asymmetry: Term | None  # of the scale factors of both senses, over their mean
-    linearity: Linearity | None
+    bias: Estimated  # rad/s, with the uncertainty of the Earth's rate along the axis
+    scale_factor: Estimated  # indicated over true rate
+    quadratic: Estimated | None  # coefficient of the square of the rate, in addition, s/rad
+    asymmetry: Estimated | None  # of the scale factors of both senses, over their mean
+    linearity: Estimated | None  # largest deviation of a rate from the line, over the largest rate
     not_observable: tuple[NotObservable, ...]  # reasons for missing values
 
-    @property
-    def bias(self) -> Array:
-        """Bias, rad/s, shape (runs,)."""
-        return self.line.value[:, 0]
 
-    @property
-    def scale_factor(self) -> Array:
-        """Indicated over true rate, shape (runs,): 1 and the scale factor's error."""
-        return self.line.value[:, 1]
-
-    @property
-    def scale_factor_sigma(self) -> float:
-        """Its standard error."""
-        return float(self.line.sigma[1])
-
-    def bias_interval(self) -> Limits:
-        """Return confidence limits of the bias, rad/s, shapes (runs,)."""
-        return compute_limits(self.bias, self.bias_sigma)
-
-    def scale_factor_interval(self) -> Limits:
-        """Return confidence limits of the scale factor, shapes (runs,)."""
-        return compute_limits(self.scale_factor, self.scale_factor_sigma)
-
-
-class RateTable:
-    """A recording on a rate table: its blocks, the gyro's noise, and the known rates.
+def fit_rate_table(
+    schedule: Schedule,
+    blocks: Blocks,
+    means: Array,
+    model: NoiseModel,
+    pointing: Pointing | None = None,
+    *,
+    setting_sigma: float = 0.0,
+) -> Calibration:
+    """Estimate bias and scale factor in runs from block means, rad/s, shape (runs, b).
 
     The blocks are of the schedule's `experiment`. Without a direction (``pointing``) the Earth's
     rate is a part of the bias. ``setting_sigma``, rad/s, is the standard deviation of the true rate
     of each stretch. Raises NotObservableError for one rate; ValueError if the deviation is
     negative, or the heading of an axis that is not vertical is missing.
     """
+    if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
+        raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
+    rate = schedule.of_blocks(blocks) + _find_earth_rate(pointing)
+    rates, levels = _group_rates(rate)
+    further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+    ones = np.ones(len(blocks))
 
-    def __init__(
-        self,
-        schedule: Schedule,
-        blocks: Blocks,
-        model: NoiseModel,
-        pointing: Pointing | None = None,
-        *,
-        setting_sigma: float = 0.0,
-    ) -> None:
-        if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
-            raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
-        open_heading = pointing is not None and pointing.heading is None
-        if pointing and open_heading and pointing.half_width > _MAX_UNKNOWN_RATE:
-            raise ValueError(
-                "the heading of the table's axis is not known: state it, or omit the direction; "
-                "the Earth's rate is then a part of the bias"
-            )
-        earth = 0.0 if pointing is None else pointing.rate
-        self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
-        rate = schedule.of_blocks(blocks) + earth
-        # The index of each rate among the distinct ones, equal up to rounding.
-        order = np.argsort(rate, kind="stable")
-        risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
-        self._levels = np.empty(len(rate), dtype=np.int64)
-        self._levels[order] = np.cumsum(risen)
-        number = int(self._levels.max()) + 1
-        self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
-        if number < 2:
-            raise NotObservableError(
-                f"the table has one rate only, {rate[0]:g} rad/s: scale factor and bias cannot be "
-                "separated; add another rate, best of the opposite sense"
-            )
-        further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
-        ones = np.ones(len(blocks))
+    def fit(*columns: Array) -> Fit:
+        return LeastSquares(blocks, model, np.column_stack(columns), further=further).fit(means)
 
-        def squares(*columns: Array) -> LeastSquares:
-            return LeastSquares(blocks, model, np.column_stack(columns), further=further)
-
-        self._line = squares(ones, rate)
-        self._open: list[NotObservable] = []
-        if pointing is None:
-            self._open.append(
-                NotObservable("bias", "the Earth's rate along the axis is a part of the bias")
-            )
-        self._quadratic = self._asymmetry = self._each = None
-        if number > 2:
-            self._quadratic = squares(ones, rate, rate**2)
-            self._each = squares(*np.eye(number)[self._levels].T)
-        else:
-            for name in ("quadratic", "linearity"):
-                self._open.append(NotObservable(name, "two rates always lie on a line"))
-        try:
-            self._asymmetry = squares(ones, rate, np.abs(rate) / 2.0)
-        except NotObservableError:
-            self._open.append(
-                NotObservable(
-                    "asymmetry",
-                    "three rates with both senses are required: otherwise it cannot be separated "
-                    "from bias or scale factor",
-                )
-            )
-
-    @property
-    def sigma(self) -> tuple[float, float]:
-        """Standard errors of bias, rad/s, and scale factor; they need no data."""
-        bias, scale = self._line.sigma
-        return math.hypot(bias, self._earth_sigma), float(scale)
-
-    def fit(self, means: Array) -> Calibration:
-        """Estimate bias and scale factor in runs from block means, rad/s, shape (runs, b)."""
-        line, quadratic, asymmetry, linearity = self._line.fit(means), None, None, None
-        if (squares := self._quadratic) is not None:
-            quadratic = Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
-        not_observable = list(self._open)
-        if (squares := self._asymmetry) is not None:
-            fit = squares.fit(means)
-            scale = fit.value[:, 1]
-            if np.any(np.abs(scale) <= compute_half_width() * fit.sigma[1]):
-                reason = (
-                    "the gyro does not follow the table, so there is no scale factor as a reference"
-                )
-                not_observable.append(NotObservable("asymmetry", reason))
-            else:  # the error of the scale factor is of second order
-                sigma = float(squares.sigma[-1] / np.abs(scale).mean())
-                asymmetry = Term(fit.value[:, -1] / scale, sigma)
-        if self._each is not None:
-            each = self._each.fit(means)
-            explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
-            at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
-            # The line is fitted to the same means, which reduces the covariance of the residuals.
-            variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
-            full_scale = float(np.abs(self._rates).max())
-            linearity = Linearity(
-                (each.value - line.value @ at_rates.T) / full_scale,
-                np.sqrt(np.maximum(variance, 0.0)) / full_scale,
-                full_scale,
-                np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
-            )
-        return Calibration(
-            line, self.sigma[0], quadratic, asymmetry, linearity, tuple(not_observable)
+    line = fit(ones, rate)
+    sigma, scale_sigma = line.sigma.tolist()
+    earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
+    bias = make_estimated(line.value[:, 0], math.hypot(sigma, earth_sigma), sigma)
+    unknown = []
+    if pointing is None:
+        reason = "the Earth's rate along the axis is a part of the bias"
+        unknown.append(NotObservable("bias", reason))
+    quadratic = asymmetry = linearity = None
+    if len(rates) > 2:
+        quadratic = _make_term(fit(ones, rate, rate**2))
+        linearity = _compute_linearity(line, fit(*np.eye(len(rates))[levels].T), rates)
+    else:
+        reason = "two rates always lie on a line"
+        unknown += [NotObservable("quadratic", reason), NotObservable("linearity", reason)]
+    try:
+        bent = fit(ones, rate, np.abs(rate) / 2.0)
+    except NotObservableError:
+        reason = (
+            "three rates with both senses are required: otherwise it cannot be separated from bias "
+            "or scale factor"
         )
+        unknown.append(NotObservable("asymmetry", reason))
+    else:
+        scale = bent.value[:, 1]
+        if np.any(np.abs(scale) <= compute_half_width() * bent.sigma[1]):
+            reason = (
+                "the gyro does not follow the table, so there is no scale factor as a reference"
+            )
+            unknown.append(NotObservable("asymmetry", reason))
+        else:
+            asymmetry = _make_term(bent, scale)
+    scale_factor = make_estimated(line.value[:, 1], scale_sigma)
+    return Calibration(line, bias, scale_factor, quadratic, asymmetry, linearity, tuple(unknown))
+
+
+def _find_earth_rate(pointing: Pointing | None) -> float:
+    """Return the Earth's rate along the table's axis, rad/s; 0 without a direction."""
+    if pointing is None:
+        return 0.0
+    if pointing.heading is None and pointing.half_width > _MAX_UNKNOWN_RATE:
+        raise ValueError(
+            "the heading of the table's axis is not known: state it, or omit the direction; the "
+            "Earth's rate is then a part of the bias"
+        )
+    return pointing.rate
+
+
+def _group_rates(rate: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return the distinct rates up to rounding, shape (k,), and the index of each of n rates."""
+    order = np.argsort(rate, kind="stable")
+    rising = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
+    levels = np.empty(len(rate), dtype=np.int64)
+    levels[order] = np.cumsum(rising)
+    first = np.unique(levels, return_index=True)[1]
+    if len(first) < 2:
+        raise NotObservableError(
+            f"the table has one rate only, {rate[0]:g} rad/s: scale factor and bias cannot be "
+            "separated; add another rate, best of the opposite sense"
+        )
+    return rate[first], levels
+
+
+def _make_term(fit: Fit, scale: Array | float = 1.0) -> Estimated:
+    """Return the last term of a fit over the scale factor, with its p-value if the line is right.
+
+    The error of the scale factor is of second order.
+    """
+    value, sigma = fit.value[:, -1] / scale, float(fit.sigma[-1] / np.abs(scale).mean())
+    return make_estimated(value, sigma, p_value=chi2.sf((value / sigma) ** 2, 1))
+
+
+def _compute_linearity(line: Fit, each: Fit, rates: Array) -> Estimated:
+    """Return the largest deviation of a rate from the line, from a fit of each rate."""
+    at_rates = np.column_stack([np.ones(len(rates)), rates])
+    largest = float(np.abs(rates).max())
+    size = np.abs(each.value - line.value @ at_rates.T) / largest
+    # The line is fitted to the same means, which reduces the covariance of the residuals.
+    variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
+    sigma = np.sqrt(np.maximum(variance, 0.0)) / largest
+    half = compute_half_width(len(rates)) * sigma
+    explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+    of_largest = float(sigma[size[0].argmax()])
+    return Estimated(
+        size.max(axis=1),
+        of_largest,
+        of_largest,
+        np.maximum(size - half, 0.0).max(axis=1),
+        (size + half).max(axis=1),
+        np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
+    )
 
 
 def calibrate(
@@ -245,19 +191,19 @@ def calibrate(
     """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
     The log is in rad/s, shape (n,); NaN where a sample is missing. Parameters and errors are as in
-    `RateTable`; ValueError also if the log ends too early, or too few samples are present.
+    `fit_rate_table`; ValueError also if the log ends too early, or too few samples are present.
     """
     run = schedule.experiment
-    whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
-    _ = RateTable(schedule, run.blocks(whole), model, pointing)
+    _group_rates(schedule.table_rates + _find_earth_rate(pointing))
     longest = choose_block_length(
         run,
         model,
         lambda blocks: np.column_stack([np.ones(len(blocks)), schedule.of_blocks(blocks)]),
     )
     measured = block_means([log], run, longest)
-    table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
-    return table.fit(measured.means), measured
+    blocks, means = measured.blocks, measured.means
+    fit = fit_rate_table(schedule, blocks, means, model, pointing, setting_sigma=setting_sigma)
+    return fit, measured
 
 
 @dataclass(frozen=True)

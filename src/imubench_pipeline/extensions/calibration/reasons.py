@@ -3,20 +3,20 @@
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import counted
 
-NO_NOISE_MODEL = (
-    "the noise of this sensor is not known: no static recording is usable, and its data sheet "
+NO_MODEL = (
+    "the noise of this sensor is not known: no static recording is usable, and its datasheet "
     "prints no noise. Add a static log of this sensor"
 )
 
 
-def printed_noise(source: str) -> str:
+def describe_printed_noise(source: str) -> str:
     return (
         f"typical figures of {source}, not measured. No static recording of this sensor determines "
         "its noise"
     )
 
 
-def static_noise(
+def describe_static_noise(
     recording: str,
     method: str,
     *,
@@ -40,7 +40,8 @@ def static_noise(
     return f"{', '.join(words)}; method {method}"
 
 
-def several_segments(segments: int) -> str:
+def explain_segments(segments: int) -> str:
+    """Return the reason why a log of several segments cannot be used as one."""
     return (
         f"the log has {counted(segments, 'segment')}, with gaps of unknown length between them. "
         "State one of them as 'use:' beside the log"

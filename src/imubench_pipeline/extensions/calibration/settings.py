@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.settings.experiments import Experiment, Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
     Angle,
@@ -23,9 +24,6 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.units import parse_quantity
 
 _MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
-
-TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-"""The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
@@ -227,7 +225,7 @@ class InPositions(Experiment):
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
         """Raise ValueError if the log lacks one of the six axes."""
-        missing = [name for name in TRIAD if name not in channels]
+        missing = [name for name in CHANNELS if name not in channels]
         if missing:
             raise ValueError(
                 f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"
@@ -245,11 +243,6 @@ class SimulatedTable(OnRateTable):
         if not self.steps:
             raise ValueError("steps is missing; expected the steady rates of the table")
         return self
-
-    @property
-    def declared(self) -> OnRateTable:
-        """The notes of a log like this one."""
-        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
 
 
 class SimulatedPositions(InPositions):
@@ -269,22 +262,12 @@ class SimulatedPositions(InPositions):
         heading = math.remainder(heading, 2.0 * math.pi)
         return {"roll": roll, "pitch": pitch, "heading": heading}
 
-    @property
-    def declared(self) -> InPositions:
-        """The notes of a log like this one."""
-        return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
-
 
 class SimulatedRest(AtRest):
     """A gyro at rest that senses its part of the Earth's rate."""
 
     true_heading: Angle = Field("0 deg", description="true heading of the axis, if heading is null")
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
-
-    @property
-    def declared(self) -> AtRest:
-        """The notes of a log like this one."""
-        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
 
     @property
     def true(self) -> Pointing:

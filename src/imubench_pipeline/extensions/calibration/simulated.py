@@ -7,11 +7,11 @@ import numpy as np
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.extensions.calibration.settings import (
-    TRIAD,
     SimulatedPositions,
     SimulatedRest,
     SimulatedTable,
 )
+from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.profiles import Profile, make_constant, make_sampled
 from imubench_pipeline.typing import Array
@@ -52,7 +52,7 @@ def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, 
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
     attitude = matrix(**positions.true_angles)
     true = compute_readings(Site(latitude=positions.latitude_si), attitude, angle, turned)
-    return {name: make_sampled(true[:, k], rate) for k, name in enumerate(TRIAD)}
+    return {name: make_sampled(true[:, k], rate) for k, name in enumerate(CHANNELS)}
 
 
 def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:

@@ -38,10 +38,9 @@ class Step:
 class BlockStates:
     """The states over the blocks of an experiment."""
 
-    # ``z_G`` and a number for each Gauss-Markov process; ``z_Q``, ``z_R``, ``z_S`` in pairs for
-    # quantization, a ramp and lines; ``z_K``, the last, is the random walk with the fixed bias
-    names: tuple[str, ...]
-    initial: Array  # shape (m, m); a root of the covariance of the states at the first sample
+    # shape (m, m); a root of the covariance of the states at the first sample; the last state is
+    # the random walk with the fixed bias
+    initial: Array
     steps: tuple[Step, ...]  # without repetitions
     which: NDArray[np.int64]  # shape (b,); index into ``steps`` for each block
     white: Array  # shape (b,); standard deviation of the white noise of each mean, rad/s
@@ -59,7 +58,6 @@ def discretise_blocks(
     if not (math.isfinite(turn_on_bias) and turn_on_bias >= 0):
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0")
     interval = 1.0 / blocks.rate
-    names: list[str] = []
     spaces: list[StateSpace] = []
     white = drive = 0.0
     for term in model.realised(interval, longest_tau(blocks)):
@@ -69,13 +67,7 @@ def discretise_blocks(
             continue
         white += space.measurement_noise
         spaces.append(space)
-        if len(term.states) == 1:  # a single state gets a number
-            (name,) = term.states
-            names.append(f"{name}{sum(other.startswith(name) for other in names) + 1}")
-        else:
-            names += term.states
     spaces.append(StateSpace.scalar(1.0, drive, turn_on_bias**2))
-    names.append("z_K")
     whole = StateSpace.together(spaces)
     gaps = np.diff(blocks.start, prepend=blocks.start[0])
     gaps[1:] -= (blocks.stop - blocks.start)[:-1]
@@ -84,7 +76,6 @@ def discretise_blocks(
     )
     steps = tuple(_build_step(whole, int(gap), int(size)) for gap, size in kinds.T)
     return BlockStates(
-        tuple(names),
         factor_covariance(whole.initial_variance),
         steps,
         which.ravel(),
@@ -121,7 +112,7 @@ class BlockFilter:
 
     def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:
         b, a, p = seen.shape
-        sizes = [len(axis.names) for axis in axes]
+        sizes = [len(axis.initial) for axis in axes]
         self._which = axes[0].which
         edges = p + np.concatenate(([0], np.cumsum(sizes)))
         self._slices = [slice(int(first), int(last)) for first, last in pairwise(edges)]

@@ -21,12 +21,12 @@ from imubench_pipeline.extensions.calibration.experiment import (
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.least_squares import (
+    Estimated,
     LeastSquares,
-    Limits,
     NotObservable,
     choose_block_length,
     compute_half_width,
-    compute_limits,
+    make_estimated,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
@@ -37,75 +37,38 @@ _MIN_HEADING_SENSITIVITY = 1e-9  # least share of the rate that may depend on th
 
 @dataclass(frozen=True)
 class StillBias:
-    """The bias of a gyro from runs at rest of one design."""
+    """The bias of a gyro from runs at rest of one design; limits cover an unknown heading."""
 
-    fixed: Array  # shape (runs,); bias at the first sample of the first block, rad/s
-    fixed_noise_sigma: float  # its standard error by the noise model, rad/s
-    present: Array  # shape (runs,); mean of bias and slow noise over the last block, rad/s
-    present_noise_sigma: float  # its standard error by the noise model, rad/s
-    rate: float  # the subtracted Earth's rate along the axis, rad/s; the middle of its range
-    rate_sigma: float  # its standard deviation, which adds to the noise of both biases, rad/s
-    bound: float | None  # largest error of ``rate`` for an unknown heading, rad/s
-    tilt_sigma: float  # standard deviation by the elevation, at the worst heading, rad/s
+    fixed: Estimated  # bias at the first sample of the first block, rad/s
+    present: Estimated  # mean of bias and slow noise over the last block, rad/s
+    bound: float | None  # largest error of the subtracted rate for an unknown heading, rad/s
     p_value: Array  # shape (runs,); of a scatter at least as large; NaN for one block
     not_observable: tuple[NotObservable, ...]
 
-    @property
-    def fixed_sigma(self) -> float:
-        """Standard error of the fixed bias, noise and direction together, rad/s."""
-        return math.hypot(self.fixed_noise_sigma, self.rate_sigma)
 
-    @property
-    def present_sigma(self) -> float:
-        """Standard error of the present bias, noise and direction together, rad/s."""
-        return math.hypot(self.present_noise_sigma, self.rate_sigma)
+def fit_bias_at_rest(
+    blocks: Blocks, means: Array, model: NoiseModel, pointing: Pointing
+) -> StillBias:
+    """Estimate the bias in runs in one position from finite block means, rad/s, (runs, b)."""
+    error = means - pointing.rate
+    fit = LeastSquares(blocks, model, np.ones((len(blocks), 1))).fit(error)
+    filtered = RateFilter(blocks, model, rate_sigma=0.0).run(error)
+    bound = pointing.half_width if pointing.heading is None else None
 
-    def fixed_interval(self) -> Limits:
-        """Return limits of the fixed bias, rad/s, shapes (runs,), wider for an unknown heading."""
-        return self._interval(self.fixed, self.fixed_noise_sigma)
+    def estimate(value: Array, noise: float) -> Estimated:
+        sigma = math.hypot(noise, pointing.rate_sigma)
+        if bound is None:
+            return make_estimated(value, sigma, noise)
+        half = compute_half_width() * math.hypot(noise, pointing.tilt_sigma) + bound
+        return Estimated(value, sigma, noise, value - half, value + half)
 
-    def present_interval(self) -> Limits:
-        """Return confidence limits of the present bias, as `fixed_interval` does."""
-        return self._interval(self.present, self.present_noise_sigma)
-
-    def _interval(self, value: Array, noise: float) -> Limits:
-        if self.bound is None:
-            return compute_limits(value, math.hypot(noise, self.rate_sigma))
-        half = compute_half_width() * math.hypot(noise, self.tilt_sigma) + self.bound
-        return value - half, value + half
-
-
-class StillRun:
-    """A run at rest in one position: blocks (of any sense), noise model, direction of the axis."""
-
-    def __init__(self, blocks: Blocks, model: NoiseModel, pointing: Pointing) -> None:
-        self.blocks, self.pointing = blocks, pointing
-        self._fixed = LeastSquares(blocks, model, np.ones((len(blocks), 1)), names=["bias"])
-        self._filter = RateFilter(blocks, model, rate_sigma=0.0)
-
-    @property
-    def fixed_noise_sigma(self) -> float:
-        """Standard error of the fixed bias by the noise model, rad/s; needs no data."""
-        return float(self._fixed.sigma[0])
-
-    def fit(self, means: Array) -> StillBias:
-        """Estimate the bias in runs from finite block means, rad/s, shape (runs, b)."""
-        pointing = self.pointing
-        error = means - pointing.rate
-        fit, filtered = self._fixed.fit(error), self._filter.run(error)
-        open_heading = pointing.heading is None
-        return StillBias(
-            fit.value[:, 0],
-            self.fixed_noise_sigma,
-            filtered.drift[:, -1],
-            float(filtered.drift_sigma[-1]),
-            pointing.rate,
-            pointing.rate_sigma,
-            pointing.half_width if open_heading else None,
-            pointing.tilt_sigma,
-            fit.p_value if fit.freedom else np.full(len(means), np.nan),
-            not_observable(pointing),
-        )
+    return StillBias(
+        estimate(fit.value[:, 0], float(fit.sigma[0])),
+        estimate(filtered.drift[:, -1], float(filtered.drift_sigma[-1])),
+        bound,
+        fit.p_value if fit.freedom else np.full(len(means), np.nan),
+        not_observable(pointing),
+    )
 
 
 def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
@@ -135,16 +98,12 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
     return tuple(quantities)
 
 
-def bias_at_rest(
-    log: Array, rate: float, model: NoiseModel, pointing: Pointing, longest: int | None = None
-) -> StillBias:
+def bias_at_rest(log: Array, rate: float, model: NoiseModel, pointing: Pointing) -> StillBias:
     """Return the bias of a gyro from a log at rest, rad/s, shape (n,), NaN where missing.
 
-    The rate is in Hz. A block has ``longest`` samples at most, by default the longest without loss
-    of information. Raises ValueError if the log has too few samples.
+    The rate is in Hz. Raises ValueError if the log has too few samples.
     """
     run = Experiment((Dwell(0, len(log), 1),), rate, 0.0)
-    if longest is None:
-        longest = choose_block_length(run, model, lambda blocks: np.ones((len(blocks), 1)))
+    longest = choose_block_length(run, model, lambda blocks: np.ones((len(blocks), 1)))
     measured = block_means([log], run, longest)
-    return StillRun(measured.blocks, model, pointing).fit(measured.means)
+    return fit_bias_at_rest(measured.blocks, measured.means, model, pointing)

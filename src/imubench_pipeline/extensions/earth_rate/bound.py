@@ -10,18 +10,17 @@ are L^-1 y, with L the Cholesky root of the covariance (R. E. Kalman 1960).
 """
 
 import math
-from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.least_squares import halve_block_length
 from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of the standard deviation by longer blocks
 _TESTED_DWELLS = 4  # dwells on which a block length is tested
 MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and in a prediction
 
@@ -127,23 +126,16 @@ def compute_final_bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float =
 def choose_block_length(experiment: Experiment, model: NoiseModel) -> int:
     """Return the longest block, in samples, whose means keep the information of the samples.
 
-    Blocks are shortened, by halves, until a fourth of their length would lower the bound, in the
-    first four dwells, by less than 0.1 %; 2,048 at most, none longer than the longest dwell.
+    It is tested on the bound in the first four dwells (see `halve_block_length`), with 2,048 blocks
+    at most, none longer than the longest dwell.
     """
     tried = Experiment(experiment.dwells[:_TESTED_DWELLS], experiment.rate, experiment.latitude)
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
     if len({dwell.sense for dwell in tried.dwells}) < 2:
         return length  # the rate is not observable, from samples either
-
-    @cache
-    def sigma(longest: int) -> float:
-        return compute_final_bound(tried.blocks(longest), model)
-
-    while length > 4 and len(tried.blocks(length // 4)) <= MAX_BLOCKS:
-        if sigma(length // 4) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length):
-            break
-        length //= 2
-    return length
+    return halve_block_length(
+        length, tried, lambda blocks: compute_final_bound(blocks, model), MAX_BLOCKS
+    )
 
 
 def convert_to_sigma(fisher: Array) -> Array:

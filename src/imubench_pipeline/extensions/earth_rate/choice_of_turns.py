@@ -91,10 +91,7 @@ def find_turns(
     quick = [e for e in rest if e.kind == "transient"]
     edge = EDGE_DWELL_FRACTION * schedule.dwell
     if any(
-        not edge <= event.time <= schedule.duration - edge
-        and not event.haste
-        and event.likelihood > CLEAR_LOG_LIKELIHOOD
-        for event in quick
+        event.is_clear and not edge <= event.time <= schedule.duration - edge for event in quick
     ):
         doubts.append("handling at the ends of the log is left out")
     silent = sum(turn.found_by == "schedule" for turn in seen)
@@ -128,8 +125,7 @@ def _merge_into_turns(
                 gap = max(other.start - stop, start - other.stop)
                 if gap > near:
                     break
-                clear = other.likelihood > CLEAR_LOG_LIKELIHOOD and not other.haste
-                if clear and other.kind == "transient":
+                if other.is_clear and other.kind == "transient":
                     start, stop = min(start, other.start), max(stop, other.stop)
                     peak = max(peak, other.peak)
                     used.add(i)
@@ -232,8 +228,7 @@ def _follow_schedule(
         near = [
             k
             for k, e in enumerate(events)
-            if abs(e.time - slot) < 2.0 * schedule.tolerance
-            and (e.likelihood > CLEAR_LOG_LIKELIHOOD and not e.haste and k not in used)
+            if abs(e.time - slot) < 2.0 * schedule.tolerance and e.is_clear and k not in used
         ]
         if near:
             best = max(near, key=lambda k: events[k].likelihood)
@@ -325,10 +320,7 @@ def find_shorter_dwell(
     alike = [
         event
         for event in events
-        if event.kind == "transient"
-        and event.likelihood > CLEAR_LOG_LIKELIHOOD
-        and not event.haste
-        and event.strength > usual - 2.0 * scatter
+        if event.kind == "transient" and event.is_clear and event.strength > usual - 2.0 * scatter
     ]
     if len(alike) < max(_MIN_PACE_TRANSIENTS, 1.5 * len(turns)):
         return None

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,11 @@ from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
-from imubench_pipeline.extensions.calibration.noise_source import (
-    NO_MODEL,
-    NoiseSource,
-    explain_segments,
-    find_noise_source,
-)
+from imubench_pipeline.extensions.calibration.noise_source import NoiseSource, find_noise_source
+from imubench_pipeline.extensions.calibration.reasons import NO_MODEL, explain_segments
 from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
-    Course,
     Courses,
     Range,
     compute_allowed_sigmas,
@@ -36,7 +32,7 @@ from imubench_pipeline.extensions.earth_rate.settings import (
     SimulatedTurns,
     TwoPosition,
 )
-from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
+from imubench_pipeline.extensions.earth_rate.simulation import design_run
 from imubench_pipeline.extensions.earth_rate.tables import (
     TURNED,
     EarthRatePublishedRow,
@@ -59,6 +55,10 @@ from imubench_pipeline.units import parse_quantity
 WHOLE = "whole"  # name of the part that is a whole recording
 _MIN_SCHEDULED_SHARE = 0.9  # share of turns found by the schedule alone: turns are not visible
 _Z_95 = 1.96  # standard deviations of a 95 % limit
+_GIVEN = (
+    "bias tracking with known rate: the filter is given the Earth's rate and returns it; whatever "
+    "rate it is given, it finds"
+)
 
 
 def make_earth_rate_tables(
@@ -78,13 +78,13 @@ def make_earth_rate_tables(
     if "simulated" in sections:
         simulated = SimulatedRecording.model_validate(sections["simulated"])
         turns = simulated.block(SimulatedTurns)
-    declared = turns.declared if turns else TwoPosition.model_validate(sections["two_position"])
+    declared = turns or TwoPosition.model_validate(sections["two_position"])
     metadata = read_metadata(next(iter(logs.values())).path)
     channel = declared.moved_gyro([*logs, *metadata.unusable])
     key = Key(sensor, recording, channel)
     if channel not in logs:
         reason = f"{channel} cannot be used; see the findings of the recording"
-        rows["earth_rate"] = list(_without(_names(key, declared), WHOLE, "not_shown", reason))
+        rows["earth_rate"] = list(_without(_start_row(key, declared), WHOLE, "not_shown", reason))
         return rows
     how = EarthRateSettings.model_validate(sections["earth_rate"])
     source = find_noise_source(
@@ -103,7 +103,7 @@ def _published(
 ) -> Iterator[EarthRatePublishedRow]:
     """Yield the printed estimates of a simulated recording, with the estimates from its log."""
     rate = parse_quantity(simulated.rate, "frequency")
-    schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
+    period, turning = turns.seconds("dwell"), turns.seconds("turning")
     axes = {str(name): axis for name, axis in simulated.channels.items()}
     noise = make_axis_model(axes[key.channel], key.channel).noise
     rows = [row for row in estimates if isinstance(row, EarthRateRow)]
@@ -113,7 +113,8 @@ def _published(
         text = simulated.duration if part == WHOLE else part.removeprefix("last ")
         value = parse_quantity(figure.printed, "angular_rate")
         duration = parse_quantity(text, "time")
-        allowed = compute_allowed_sigmas(schedule, duration, noise)
+        design = design_run(duration, period, turning, rate, turns.latitude_si)
+        allowed = compute_allowed_sigmas(design, noise)
         off = (value - EARTH_RATE) / allowed.sigma
         yield EarthRatePublishedRow(
             **asdict(key),
@@ -132,13 +133,20 @@ def _published(
         )
 
 
-def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
+def _start_row(
+    key: Key, declared: TwoPosition, source: NoiseSource | None = None
+) -> partial[EarthRateRow]:
     """Return the columns that all rows of the table ``earth_rate`` share."""
-    return asdict(key) | {
-        "latitude": declared.latitude_si,
-        "model": source.model.name if source else None,
-        "model_from": source.words if source else None,
-    }
+    return partial(
+        EarthRateRow,
+        **asdict(key),
+        parameter="earth_rate",
+        unit="rad/s",
+        truth=EARTH_RATE,
+        latitude=declared.latitude_si,
+        model=source.model.name if source else None,
+        model_from=source.words if source else None,
+    )
 
 
 def _earth_rate(
@@ -154,15 +162,15 @@ def _earth_rate(
     Without a noise source the turns are found, and nothing is estimated. `begins`: time of the
     first sample that is used, s from the first of the recording.
     """
-    names = _names(key, declared, source)
+    row = _start_row(key, declared, source)
     if len(log.segments) > 1 or log.position_elsewhere:
         reason = (
-            explain_segments(log)
+            explain_segments(len(log.segments))
             if len(log.segments) > 1
             else "the position has a clock of its own; give it as a column of the file that the "
             "gyro is in, or leave 'position' out"
         )
-        yield from _without(names, WHOLE, "not_shown", reason)
+        yield from _without(row, WHOLE, "not_shown", reason)
         return
     bias = declared.turn_on_bias_si
     if source is not None:
@@ -190,7 +198,7 @@ def _earth_rate(
             f"no turns: {error}; check 'dwell' and 'channel' of two_position, or give the log a "
             "column with the position (log: position)"
         )
-        yield from _without(names, WHOLE, "no_turns", reason)
+        yield from _without(row, WHOLE, "no_turns", reason)
         return
     used = np.where(turning.senses(len(samples), log.rate) == 0, np.nan, samples)  # no knocks
     dwells = [
@@ -200,7 +208,7 @@ def _earth_rate(
     ]
     yield from _turning_rows(key, turning, dwells, used, begins)
     if source is None:
-        yield from _without(names, WHOLE, "no_model", NO_MODEL)
+        yield from _without(row, WHOLE, "no_model", NO_MODEL)
         return
     model, *drawn = source.model, *source.drawn
     if drift := declared.drift_si:  # beside the noise of the model
@@ -213,16 +221,16 @@ def _earth_rate(
         chosen = tuple(dwell for _, dwell in dwells if dwell.start >= start * log.rate)
         if len(chosen) < 2:
             reason = f"{len(chosen)} dwells are not enough; it takes one of each position"
-            yield from _without(names, part, "too_short", reason)
+            yield from _without(row, part, "too_short", reason)
             continue
         try:
             experiment = Experiment(chosen, log.rate, declared.latitude_si)
             courses = estimate_courses(used, experiment, model, source.papers, bias)
         except (ValueError, LinAlgError) as error:
-            yield from _without(names, part, "too_short", str(error))
+            yield from _without(row, part, "too_short", str(error))
             continue
-        about = names | {"part": part, "dwells": len(chosen), "turns": len(chosen) - 1}
-        ranges = compute_sigma_ranges(courses.measured.blocks, model, drawn, bias)
+        about = partial(row, part=part, dwells=len(chosen), turns=len(chosen) - 1)
+        ranges = compute_sigma_ranges(courses.measured.blocks, drawn, bias)
         yield from _estimates(about, courses, source, unsure, ranges)
         yield from _series(key, part, courses, begins)
 
@@ -289,70 +297,60 @@ def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
             "where the axis points first is not known, and taken for north: the sign may be the "
             "other one; state 'first: north' or 'first: south'"
         )
-    if not reasons:
-        return {}
     doubtful = turning.ambiguous or (unseen and not trusted)
     return {"status": "ambiguous" if doubtful else "ok", "reasons": tuple(reasons)}
 
 
 def _estimates(
-    names: dict[str, Any],
+    row: partial[EarthRateRow],
     courses: Courses,
     source: NoiseSource,
     unsure: dict[str, Any],
     ranges: dict[str, Range],
 ) -> Iterator[EarthRateRow]:
-    """Yield the estimates of each method; ``unsure`` replaces their status."""
+    """Yield the estimates of each method; ``unsure``: status and reasons of all."""
     measured, blocks = courses.measured, courses.measured.blocks
-    about = names | {
-        "parameter": "earth_rate",
-        "unit": "rad/s",
-        "truth": EARTH_RATE,
-        "white": compute_white_sigma(source.model, blocks),
-        "duration": blocks.duration,
-        "samples": int(blocks.count.sum()),
-        "missing": measured.missing + measured.left_out,
-        "block": courses.longest / blocks.rate,
-    }
+    about = partial(
+        row,
+        white=compute_white_sigma(source.model, blocks),
+        duration=blocks.duration,
+        samples=int(blocks.count.sum()),
+        missing=measured.missing + measured.left_out,
+        block=courses.longest / blocks.rate,
+    )
     for course in courses.courses:
-        row: dict[str, Any] = {"method": course.method, **ranges.get(course.method, {})}
+        one = partial(about, method=course.method, **ranges.get(course.method, {}))
         if course.reason is not None:
-            row |= {"status": "not_shown", "reasons": (course.reason,)}
+            yield one(status="not_shown", reasons=(course.reason,))
         elif course.sigma is None:
-            row |= {"value": float(course.rate[-1]), "status": "given"}
-            given = (
-                "bias tracking with known rate: the filter is given the Earth's rate and "
-                "returns it; whatever rate it is given, it finds"
+            settled = None if course.settled in (None, math.inf) else course.settled
+            yield one(
+                value=float(course.rate[-1]), status="given", reasons=(_GIVEN,), settled=settled
             )
-            row |= {"reasons": (given,)}
-            row |= {"settled": None if course.settled in (None, math.inf) else course.settled}
         else:
             value, sigma = float(course.rate[-1]), float(course.sigma[-1])
-            row |= {"value": value, "sigma": sigma, "off_sigma": (value - EARTH_RATE) / sigma}
-            row |= {"lower": value - _Z_95 * sigma, "upper": value + _Z_95 * sigma}
-            row |= {"status": "ok"} | unsure
-        yield EarthRateRow(**about, **row)
+            yield one(
+                value=value,
+                lower=value - _Z_95 * sigma,
+                upper=value + _Z_95 * sigma,
+                sigma=sigma,
+                off_sigma=(value - EARTH_RATE) / sigma,
+                **unsure,
+            )
 
 
-def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[EarthRateRow]:
+def _without(
+    row: partial[EarthRateRow], part: str, status: str, reason: str
+) -> Iterator[EarthRateRow]:
     """Yield the rows of a part without estimates."""
     for method in METHODS:
-        yield EarthRateRow(
-            **names,
-            part=part,
-            method=method,
-            parameter="earth_rate",
-            unit="rad/s",
-            truth=EARTH_RATE,
-            status=status,
-            reasons=(reason,),
-        )
+        yield row(part=part, method=method, status=status, reasons=(reason,))
 
 
 def _series(key: Key, part: str, courses: Courses, begins: float) -> Iterator[EarthRateSeriesRow]:
     """Yield the rows of the table ``earth_rate_series``."""
-    drift = Course("smoother", courses.drift_time, courses.drift, courses.drift_sigma)
-    for quantity, course in [*(("rate", course) for course in courses.courses), ("drift", drift)]:
+    rates = [("rate", course) for course in courses.courses]
+    for quantity, course in [*rates, ("drift", courses.drift)]:
         for k in thin(len(course.time)):
             yield EarthRateSeriesRow(
                 **asdict(key),

@@ -17,11 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.noise_source import (
+    NoiseAtRest,
+    lend_axes,
+    load_noise_at_rest,
+)
 from imubench_pipeline.extensions.earth_rate.bound import (
     MAX_BLOCKS,
     choose_block_length,
@@ -33,7 +37,6 @@ from imubench_pipeline.extensions.earth_rate.tables import AlignmentRow, EarthRa
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import find_static_recordings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.tables.keys import Key
@@ -53,15 +56,6 @@ _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goa
 
 
 @dataclass(frozen=True)
-class Prediction:
-    """The least standard deviation of the rate as a run grows."""
-
-    turns: NDArray[np.int64]  # shape (k,); turns done, from 1
-    time: Array  # shape (k,); end of the dwell after the last turn, s
-    sigma: Array  # shape (k,); rad/s
-
-
-@dataclass(frozen=True)
 class DwellCurve:
     """The least standard deviation of the rate for a given run time, over the dwell."""
 
@@ -74,13 +68,12 @@ class DwellCurve:
         """Index of the least standard deviation."""
         return int(np.argmin(self.sigma))
 
-    def nearly_best(self) -> tuple[float, float]:
-        """Return the shortest and longest dwell with a loss of 1 % at most, s."""
-        little = self.sigma <= (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
-        worse = np.flatnonzero(~little)
-        first = int(np.max(worse[worse < self.best], initial=-1)) + 1
-        last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
-        return float(self.dwell[last]), float(self.dwell[first])
+    @property
+    def nearly_best(self) -> NDArray[np.bool_]:
+        """Whether a dwell, and each one between it and the best, loses 1 % at most, shape (k,)."""
+        worse = self.sigma > (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
+        stretch = np.cumsum(worse)
+        return np.asarray((stretch == stretch[self.best]) & ~worse)
 
 
 @dataclass(frozen=True)
@@ -93,18 +86,19 @@ class Outlook:
     rate: float  # sampling rate, Hz
     turn_on_bias: float = math.inf  # of the fixed bias, rad/s; by default unknown
 
-    def against_time(self, dwell: float, turns: int) -> Prediction:
-        """Return the bound after each turn and dwell up to the last turn; the dwell is in s."""
-        information = self._compute_information(dwell, turns + 1)
-        number = np.arange(1, turns + 1)
-        time = (number + 1) * dwell + number * self.turning
-        return Prediction(number, time, convert_to_sigma(information[1:]))
+    def run_time(self, dwell: float, turns: int) -> float:
+        """Return the time of a number of turns and the dwells, s, before and after them, s."""
+        return (turns + 1) * dwell + turns * self.turning
+
+    def sigmas_after(self, dwell: float, turns: int) -> Array:
+        """Return the bound, rad/s, after each of the turns and the dwell, s, that follows it."""
+        return convert_to_sigma(self._compute_information(dwell, turns + 1)[1:])
 
     def turns_needed(self, dwell: float, relative: float) -> int | None:
         """Return the number of turns for a relative standard deviation of the Earth's rate.
 
-        None: more than `MAX_TURNS`. The run lasts (turns + 1) dwells, each with ``dwell`` s of
-        data, and the turns. Raises ValueError if ``relative``, such as 0.01, is not above 0.
+        None: more than `MAX_TURNS`. Each dwell has ``dwell`` s of data. Raises ValueError if
+        ``relative``, such as 0.01, is not above 0.
         """
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
@@ -126,11 +120,6 @@ class Outlook:
             _compute_growth(information) * beyond if beyond else 0.0
         )
         return float(convert_to_sigma(np.array([last]))[0])
-
-    def time_needed(self, dwell: float, relative: float) -> float:
-        """Return the run time for a relative sigma of the Earth's rate, s; inf: too many turns."""
-        turns = self.turns_needed(dwell, relative)
-        return math.inf if turns is None else (turns + 1) * dwell + turns * self.turning
 
     def over_dwell(self, run_time: float) -> DwellCurve:
         """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
@@ -160,16 +149,6 @@ class Outlook:
         lengths = ((run_time - (n - 1) * self.turning) / n for n in dwells.tolist())
         pairs = zip(lengths, dwells.tolist(), strict=True)
         return convert_to_sigma(np.array([self._compute_information(*pair)[-1] for pair in pairs]))
-
-    def heading(self, dwell: float, turns: int) -> Array:
-        """Return the least standard deviation of the heading by gyrocompassing after each turn.
-
-        The axis is perpendicular to north, and is turned end for end: half the difference of its
-        readings is w_ie cos(latitude) times the (small) heading error, as in
-        `error_budget.Gyrocompass` with two positions. In rad, shape (turns,).
-        """
-        of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
-        return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
 
     def _compute_information(self, dwell: float, dwells: int) -> Array:
         """Return the information after each of a number of dwells."""
@@ -213,31 +192,31 @@ def prediction_rows(
         if turns is None:
             continue
         most = max(most, turns)
-        time = (turns + 1) * dwell + turns * outlook.turning
+        time = outlook.run_time(dwell, turns)
         # The reached value: the last necessary turn may give far more than the goal.
         sigma = outlook.sigma_after(dwell, turns)
         needed = row(of="goal", goal=goal, dwell=dwell, turns=turns, time=time)
         yield _add_sigma(needed, sigma)
-    course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
-    shown = np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64) - 1
-    for k in np.unique(shown).tolist():
-        turns, time = int(course.turns[k]), float(course.time[k])
+    sigmas = outlook.sigmas_after(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
+    shown = np.rint(np.geomspace(1, len(sigmas), _TIME_CURVE_POINTS)).astype(np.int64)
+    for turns in np.unique(shown).tolist():
+        time = outlook.run_time(dwell, turns)
         reached = row(of="time", dwell=dwell, turns=turns, time=time)
-        yield _add_sigma(reached, float(course.sigma[k]))
+        yield _add_sigma(reached, float(sigmas[turns - 1]))
     curve = outlook.over_dwell(run_time)
-    low, high = curve.nearly_best()
-    for k, number in enumerate(curve.dwells.tolist()):
-        length, near = float(curve.dwell[k]), low <= curve.dwell[k] <= high
-        tried = row(of="dwell", dwell=length, turns=number - 1, time=run_time)
-        tried = replace(tried, best=k == curve.best, nearly_best=bool(near))
+    for k, (number, near) in enumerate(
+        zip(curve.dwells.tolist(), curve.nearly_best.tolist(), strict=True)
+    ):
+        tried = row(of="dwell", dwell=float(curve.dwell[k]), turns=number - 1, time=run_time)
+        tried = replace(tried, best=k == curve.best, nearly_best=near)
         yield _add_sigma(tried, float(curve.sigma[k]))
 
 
 def _add_sigma(row: EarthRatePredictionRow, sigma: float) -> EarthRatePredictionRow:
     if not math.isfinite(sigma):
         return row
-    # Heading error of a gyro perpendicular to north: sigma cos(latitude) over w_ie cos(latitude),
-    # see `Outlook.heading`.
+    # The heading of a gyro perpendicular to north: half the difference of its readings, with the
+    # error sigma cos(latitude), is w_ie cos(latitude) times the (small) heading error.
     return replace(row, sigma=sigma, relative=sigma / EARTH_RATE, heading=sigma / EARTH_RATE)
 
 
@@ -249,37 +228,6 @@ _SIMULATED_TRIADS = 400  # number of simulated triads of the check; their rms is
 
 _CHECK_SEED = 20260101
 _TYPICAL_KINDS = ("1sigma", "typ")
-
-
-@dataclass(frozen=True)
-class Noise:
-    """The noise of a sensor at rest."""
-
-    recording: str
-    rate: float  # Hz
-    models: dict[str, NoiseModel]  # by channel
-
-    def select_axes(self, quantity: str) -> tuple[str, ...]:
-        """Return the channels whose models the axes x, y and z of a quantity have.
-
-        An axis that is missing in the log has the noise of another one.
-        """
-        names = [name for name in self.models if name.startswith(quantity)]
-        wanted = (f"{quantity}_{axis}" for axis in "xyz")
-        return tuple(
-            own if own in self.models else names[place % len(names)]
-            for place, own in enumerate(wanted)
-        )
-
-
-def load_noise_at_rest(folders: Sequence[Path]) -> Noise | None:
-    """Return the noise of a sensor from its static recordings; None if none has an estimate."""
-    for row, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
-        best = read_recommended_estimates(folder / "parameters.parquet")
-        models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
-        if row.rate is not None and any(name.startswith("gyro_") for name in models):
-            return Noise(row.recording, row.rate, models)
-    return None
 
 
 def make_outlook_tables(
@@ -315,9 +263,12 @@ def make_outlook_tables(
 
 
 def _predict_alignment(
-    sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
+    sensor: str, noise: NoiseAtRest, printed: Datasheet, how: EarthRateSettings
 ) -> Iterator[AlignmentRow]:
-    gyros, accelerometers = noise.select_axes("gyro"), noise.select_axes("accel")
+    axes = lend_axes(noise.models)
+    gyros, accelerometers = (
+        tuple(axes[f"{quantity}_{axis}"] for axis in "xyz") for quantity in QUANTITIES
+    )
     gyro_bias, gyro_words = _find_bias(printed, "gyro", how)
     accelerometer_bias, accelerometer_words = _find_bias(printed, "accel", how)
     triad = Triad(

@@ -293,8 +293,6 @@ def _pack_figures(
     return {
         "channel": rows[0].channel if rows else "",
         "truth": rows[0].truth if rows else None,
-        "latitude": rows[0].latitude if rows else None,
-        "simulated": view.simulated,
         "dwells": {
             "start": arrays.exact(fill_missing(row.start for row in dwells)),
             "stop": arrays.exact(fill_missing(row.stop for row in dwells)),
@@ -541,10 +539,8 @@ def _describe_check(rows: Sequence[AlignmentRow]) -> str:
     for row in rows:
         if row.simulated is None:
             continue
-        errors = {"roll": row.error_roll, "pitch": row.error_pitch, "heading": row.error_heading}
-        ratios = (
-            f"{name} {number_text(one, 3)}" for name, one in errors.items() if one is not None
-        )
+        errors = {name: getattr(row, f"error_{name}") for name in ("roll", "pitch", "heading")}
+        ratios = (f"{name} {number_text(one, 3)}" for name, one in errors.items() if one)
         comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {', '.join(ratios)}")
     if not comparisons:
         return ""

@@ -19,14 +19,11 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Differences:
-    """Estimates from differences between dwells, and their mean as it grows with time."""
+    """The mean of estimates from differences between dwells, as it grows with time."""
 
     time: Array  # shape (p,); end of the last dwell of each, s from the first sample
-    each: Array  # shape (runs, p); each estimate, rad/s
-    each_sigma: Array  # shape (p,); its standard error, rad/s
     rate: Array  # shape (runs, p); mean of the estimates up to each, rad/s
     sigma: Array  # shape (p,); its standard error, rad/s
-    scatter: Array  # shape (runs, p); standard error from the scatter, rad/s; NaN for one estimate
 
 
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
@@ -90,17 +87,9 @@ def _estimate_differences(
     number = np.arange(1, len(differences) + 1)
     # Sums of the leading parts of the covariance.
     total = np.diag(np.cumsum(np.cumsum(covariance, axis=0), axis=1))
-    rate = np.cumsum(each, axis=1) / number
-    squares = np.cumsum((each - each[:, :1]) ** 2, axis=1) / number - (rate - each[:, :1]) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scatter = np.sqrt(np.maximum(squares, 0.0) / (number - 1.0))
-    scatter[:, 0] = np.nan
     last = np.array([parts[-1][0] for parts in differences])
     return Differences(
         dwells.end[last],
-        each,
-        np.sqrt(np.maximum(np.diag(covariance), 0.0)),  # 0 for a ramp in triples
-        rate,
-        np.sqrt(np.maximum(total, 0.0)) / number,
-        scatter,
+        np.cumsum(each, axis=1) / number,
+        np.sqrt(np.maximum(total, 0.0)) / number,  # 0 for a ramp in triples
     )

@@ -28,12 +28,10 @@ from imubench_pipeline.extensions.calibration.experiment import (
     block_means,
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.calibration.sigma_range import sigma_range
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -43,6 +41,7 @@ GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"
 METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)  # in the order of display
 _MAX_POINTS = 400
 _TESTED_CLOCK_ERRORS = 20_001
+_TAIL_PROBABILITY = (1.0 - 0.95) / 2.0  # beyond each 95 % limit
 _Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 Range = dict[str, float]
@@ -67,10 +66,7 @@ class Courses:
     courses: tuple[Course, ...]  # one per method
     measured: Measured
     longest: int  # largest number of samples of a block
-    # shape (b,); middle of each block, s, smoothed slow error with the bias, and its sigma, rad/s
-    drift_time: Array
-    drift: Array
-    drift_sigma: Array
+    drift: Course  # smoothed slow error with the bias, at the middle of each block
 
 
 def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
@@ -101,7 +97,7 @@ def estimate_courses(
         blocks, model, turn_on_bias=UNINFORMATIVE_SIGMA if turn_on_bias is None else turn_on_bias
     )
     filtered = rate_filter.run(means)
-    smoothed = rate_filter.smooth(filtered)
+    drift, drift_sigma = rate_filter.smooth(filtered)
     # Before the second position the rate and the bias are not separable.
     from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
@@ -114,8 +110,8 @@ def estimate_courses(
             courses.append(Course(method, np.empty(0), np.empty(0), np.empty(0), str(error)))
     filter_rate, filter_sigma = filtered.rate[0, from_second], filtered.rate_sigma[from_second]
     courses += [
-        Course("filter", first + filtered.time[from_second], filter_rate, filter_sigma),
-        Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
+        Course("filter", first + blocks.end[from_second], filter_rate, filter_sigma),
+        Course("smoother", whole, np.full(2, filter_rate[-1]), np.full(2, filter_sigma[-1])),
     ]
     for method, start in GIVEN.items():
         try:
@@ -126,8 +122,8 @@ def estimate_courses(
         after = settled(tracked.mean, experiment.rate, EARTH_RATE)
         time = tracked.sample / experiment.rate
         courses.append(Course(method, time, tracked.mean, None, settled=after))
-    middle, drift = first + blocks.middle, smoothed.drift[0]
-    return Courses(tuple(courses), measured, longest, middle, drift, smoothed.drift_sigma)
+    smoothed = Course("smoother", first + blocks.middle, drift[0], drift_sigma)
+    return Courses(tuple(courses), measured, longest, smoothed)
 
 
 def thin(points: int) -> Iterator[int]:
@@ -141,7 +137,7 @@ def thin(points: int) -> Iterator[int]:
 
 
 def compute_sigma_ranges(
-    blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
+    blocks: Blocks, drawn: Sequence[NoiseModel], turn_on_bias: float | None
 ) -> dict[str, Range]:
     """Return the 95 % limits of the standard deviation of each method at the end of a run, rad/s.
 
@@ -160,10 +156,11 @@ def compute_sigma_ranges(
     ranges: dict[str, Range] = {}
     for method, sigma in methods.items():
         try:
-            limits = sigma_range(sigma, model, drawn)
+            values = [sigma(one) for one in drawn]
         except (ValueError, LinAlgError):
             continue  # no pair or triple in these dwells; the estimate has the reason
-        ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
+        lower, upper = np.quantile(values, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY]).tolist()
+        ranges[method] = {"sigma_lower": lower, "sigma_upper": upper}
     if "filter" in ranges:
         ranges["smoother"] = ranges["filter"]  # equal at the end of the run
     return ranges
@@ -178,9 +175,8 @@ class AllowedSigmas:
     sigma_filter: float
 
 
-def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> AllowedSigmas:
-    """Return the standard deviations by noise of estimates of a run, over a duration in s."""
-    design = run.experiment(duration)
+def compute_allowed_sigmas(design: Experiment, model: NoiseModel) -> AllowedSigmas:
+    """Return the standard deviations by noise of estimates of a run."""
     blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
     return AllowedSigmas(

@@ -129,11 +129,6 @@ class SimulatedTurns(TwoPosition):
                 raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
         return self
 
-    @property
-    def declared(self) -> TwoPosition:
-        """The notes of a log like this one."""
-        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
-
 
 class EarthRateSettings(Strict):
     """The Earth's rate from turned gyros, and the recordings required for it."""

@@ -38,32 +38,26 @@ ASSUMED_LATITUDE = math.radians(-23.3)
 ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
-@dataclass(frozen=True)
-class RunDesign:
-    """A run as its source describes it."""
+def design_run(
+    duration: float, period: float, turning: float, rate: float, latitude: float
+) -> Experiment:
+    """Return the design of a run as its source describes it.
 
-    dwell: float  # from turn to turn, s
-    turning: float  # turning time within it, s
-    rate: float  # sampling rate, Hz
-    latitude: float  # rad
-
-    def experiment(self, duration: float) -> Experiment:
-        """Return the design of a run of this duration, s."""
-        return Experiment.regular(
-            dwell=self.dwell - self.turning,
-            turning=self.turning,
-            dwells=round(duration / self.dwell),
-            rate=self.rate,
-            latitude=self.latitude,
-        )
-
-
-PAPER_DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
+    The duration, the period from turn to turn and the time of a turn are in s, the rate in Hz, the
+    latitude in rad.
+    """
+    return Experiment.regular(
+        dwell=period - turning,
+        turning=turning,
+        dwells=round(duration / period),
+        rate=rate,
+        latitude=latitude,
+    )
 
 
 def design_paper_run(minutes: float) -> Experiment:
     """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
-    return PAPER_DESIGN.experiment(60.0 * minutes)
+    return design_run(60.0 * minutes, PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 
 
 @dataclass(frozen=True)
@@ -86,7 +80,7 @@ def simulate_runs(
 ) -> Runs:
     """Draw exact block means of runs; the rate, and sigma of the fixed biases, are in rad/s."""
     block_model = discretise_blocks(model, blocks, turn_on_bias)
-    m = len(block_model.names)
+    m = len(block_model.initial)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
     for k, which in enumerate(block_model.which):

@@ -6,7 +6,6 @@ column with the position, else from events in the log, else from the schedule. `
 turns from such a column.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +20,6 @@ from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
     list_disturbances,
 )
 from imubench_pipeline.extensions.earth_rate.turns import (
-    CLEAR_LOG_LIKELIHOOD,
     DETECTION_ORDER,
     Event,
     FoundDwell,
@@ -128,11 +126,14 @@ def find_turning(
     from the start of a turn to the start of the next, ``margin`` is left out on both sides of a
     detected turn; ``turning`` and ``start`` of the first dwell are for turns that are not detected;
     all in s. ``position``, shape (n,): see `find_stays`. ``model``: the noise at rest, SI, by
-    default estimated from the log. Raises ValueError if an argument is out of range, the log is
-    shorter than two dwells, or there is no evidence of turns.
+    default estimated from the log. Raises ValueError if the log is shorter than two dwells, or
+    there is no evidence of turns.
     """
-    log = np.asarray(log, dtype=np.float64)
-    schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
+    duration = len(log) / rate
+    if duration < 2.0 * dwell - 1.0 / rate:
+        raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
+    tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
+    schedule = TurnSchedule(dwell, start, turning, tolerance, margin, duration)
     blocks = average_log_blocks(log, rate, dwell, model)
     # Transients and steps; of near ones, the greater.
     events = detect_transients(blocks, log, rate)
@@ -151,7 +152,7 @@ def find_turning(
     column_sense = None
     if position is not None:
         turns, knocks, column_sense, more_doubts = _find_turns_in_column(
-            position, log, rate, events, schedule
+            position, rate, events, schedule
         )
     else:
         turns, knocks, more_doubts = find_turns(blocks, events, schedule, trust_schedule)
@@ -186,48 +187,16 @@ def find_turning(
     )
 
 
-def _check_schedule(
-    log: Array,
-    rate: float,
-    dwell: float,
-    turning: float,
-    start: float,
-    first_sense: int | None,
-    margin: float,
-) -> TurnSchedule:
-    if not (math.isfinite(rate) and rate > 0.0):
-        raise ValueError(f"rate is {rate}, expected Hz above 0")
-    if not (math.isfinite(dwell) and dwell > 0.0):
-        raise ValueError(f"dwell is {dwell}, expected s above 0")
-    if not 0.0 <= turning < 0.5 * dwell:
-        raise ValueError(f"turning is {turning}, expected s from 0 to half the dwell of {dwell} s")
-    if first_sense not in (None, 1, -1):
-        raise ValueError(f"first_sense is {first_sense}, expected 1, -1 or None")
-    if not margin >= 0.0:
-        raise ValueError(f"margin is {margin}, expected s from 0")
-    if log.ndim != 1:
-        raise ValueError(f"the log has the shape {log.shape}, expected one axis")
-    duration = len(log) / rate
-    if duration < 2.0 * dwell - 1.0 / rate:
-        raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
-    tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
-    return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
-
-
 def _find_turns_in_column(
-    position: Array, log: Array, rate: float, events: list[Event], schedule: TurnSchedule
+    position: Array, rate: float, events: list[Event], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
-    if np.shape(position) != np.shape(log):
-        raise ValueError(
-            f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
-        )
-    column_stays = find_stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
+    column_stays = find_stays(position, rate, 0.1 * schedule.dwell)
     turns, used = [], set()
     for stop, start in zip(column_stays.stop[:-1], column_stays.start[1:], strict=True):
         first, last, peak = float(stop), float(start), None
         for k, event in enumerate(events):
             near = event.stop > stop - 3.0 and event.start < start + 3.0
-            if near and not event.haste and event.likelihood > CLEAR_LOG_LIKELIHOOD:
+            if near and event.is_clear:
                 first, last = min(first, event.start), max(last, event.stop)
                 peak = max(peak or 0.0, event.peak)
                 used.add(k)

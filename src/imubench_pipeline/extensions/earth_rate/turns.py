@@ -37,9 +37,7 @@ class LevelBlocks:
     """A log as means of short blocks."""
 
     length: float  # of a block, s
-    # mean, level: shape (b,); mean of the samples present, or NaN, and running median, rad/s
-    mean: Array
-    level: Array
+    level: Array  # shape (b,); running median, rad/s; NaN where there are no samples
     z: Array  # shape (b,); mean less level in standard deviations; 0 where there are no samples
     present: NDArray[np.bool_]  # shape (b,); where there are samples
     sigma: float  # standard deviation of the noise of a full block, rad/s
@@ -63,6 +61,11 @@ class Event:
     def time(self) -> float:
         """The middle, s."""
         return 0.5 * (self.start + self.stop)
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it is neither noise nor a knock."""
+        return self.likelihood > CLEAR_LOG_LIKELIHOOD and not self.haste
 
 
 def average_log_blocks(
@@ -100,7 +103,7 @@ def average_log_blocks(
         of_model = math.sqrt(float(model.allan_variance(length, rate)))
         rough = not 2 / 3 < own / of_model < 1.5
         sigma = own if rough else of_model
-    return LevelBlocks(length, mean, level, residual / sigma, present, sigma, rough)
+    return LevelBlocks(length, level, residual / sigma, present, sigma, rough)
 
 
 def _estimate_sigma(residual: Array) -> float:
@@ -316,8 +319,7 @@ class FoundDwell:
 
     def in_samples(self, rate: float) -> Dwell:
         """Return the dwell in samples at a rate, Hz; raise ValueError if it has none."""
-        first, last = (_find_first_sample(time, rate) for time in (self.start, self.stop))
-        return Dwell(first, last, self.sense)
+        return Dwell(*_find_samples(self.start, self.stop, rate), self.sense)
 
 
 @dataclass(frozen=True)
@@ -340,17 +342,15 @@ class Turning:
         """Return the sense of each sample, shape (samples,), 0 where it is not used; rate in Hz."""
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:
-            first, last = (_find_first_sample(time, rate) for time in (dwell.start, dwell.stop))
-            sense[first:last] = dwell.sense
+            sense[slice(*_find_samples(dwell.start, dwell.stop, rate))] = dwell.sense
         for knock in self.knocks:
-            first, last = (max(0, _find_first_sample(time, rate)) for time in knock)
-            sense[first:last] = 0
+            sense[slice(*_find_samples(*knock, rate))] = 0
         return sense
 
 
-def _find_first_sample(time: float, rate: float) -> int:
-    """Return the first sample not before a time, with a tolerance for rounding."""
-    return int(np.ceil(time * rate - 1e-6))
+def _find_samples(start: float, stop: float, rate: float) -> tuple[int, int]:
+    """Return the first samples not before two times, with a tolerance for rounding."""
+    return math.ceil(start * rate - 1e-6), math.ceil(stop * rate - 1e-6)
 
 
 def compute_differences(

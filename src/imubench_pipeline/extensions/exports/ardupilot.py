@@ -15,19 +15,10 @@ libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp (TEMP_REFERENCE, SCALE
 correct_sensor); ArduPilot/pymavlink, mavparm.py (``load``).
 """
 
-from imubench_pipeline.extensions.exports import comments, programs
+from imubench_pipeline.extensions.exports import programs
 from imubench_pipeline.extensions.exports.imu import AXES, Imu, TemperatureEffect
 from imubench_pipeline.extensions.exports.px4 import clip_values
 
-ARDUPILOT = programs.declare(
-    "ArduPilot (EKF3)",
-    "https://github.com/ArduPilot/ardupilot/blob/HEAD/libraries/AP_NavEKF3/AP_NavEKF3_core.cpp",
-    "Noise per step of the filter of about 12 ms: N / sqrt(dt) and K / sqrt(dt), dt = 12 ms; N "
-    "and K are two-sided densities, SI. Vibration in flight adds to the noise at rest, and the "
-    "defaults of ArduPilot allow for it.",
-    (programs.FILTER_SAMPLE, "EK3_GYRO_P_NSE", "EK3_ACC_P_NSE"),
-    (programs.FILTER_STEP, "EK3_GBIAS_P_NSE", "EK3_ABIAS_P_NSE"),
-)
 STEP = 0.012  # EKF_TARGET_DT, s
 
 _PARAMETER_RANGES = {
@@ -55,8 +46,8 @@ def write(imu: Imu) -> str:
             "temperature; --method compensated leaves it out."
         )
     # Not every program that loads the file reads exponents.
-    rows = [f"{name},{comments.format_decimal(value)}\n" for name, value in values.items()]
-    return comments.format_comments(about) + "".join(rows)
+    rows = [f"{name},{programs.format_decimal(value)}\n" for name, value in values.items()]
+    return programs.format_comments(about) + "".join(rows)
 
 
 def _list_corrections(imu: Imu) -> dict[str, float]:
@@ -75,3 +66,17 @@ def _list_corrections(imu: Imu) -> dict[str, float]:
             for order, value in enumerate((slope, square, 0.0), start=1):
                 values[f"{word}{order}_{axis.upper()}"] = _COEFFICIENT_SCALE * value
     return {f"INS_TCAL1_{name}": value for name, value in values.items()}
+
+
+ARDUPILOT = programs.declare(
+    "ardupilot",
+    "ArduPilot (EKF3)",
+    "ekf3.param",
+    "https://github.com/ArduPilot/ardupilot/blob/HEAD/libraries/AP_NavEKF3/AP_NavEKF3_core.cpp",
+    "Noise per step of the filter of about 12 ms: N / sqrt(dt) and K / sqrt(dt), dt = 12 ms; N "
+    "and K are two-sided densities, SI. Vibration in flight adds to the noise at rest, and the "
+    "defaults of ArduPilot allow for it.",
+    (programs.FILTER_SAMPLE, "EK3_GYRO_P_NSE", "EK3_ACC_P_NSE"),
+    (programs.FILTER_STEP, "EK3_GBIAS_P_NSE", "EK3_ABIAS_P_NSE"),
+    writer=write,
+)

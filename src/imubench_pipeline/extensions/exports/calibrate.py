@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from imubench_pipeline.extensions.exports.imu import Imu
+    from imubench_pipeline.extensions.exports.programs import Program
     from imubench_pipeline.run.analysis.compilation import Compilation
 
 _MAX_EVENTS = 3
@@ -52,14 +53,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
     from imubench_pipeline.extensions.exports.imu import ExportError
-    from imubench_pipeline.extensions.exports.targets import TARGETS
 
     try:
-        exports.check_options(options)
+        program = exports.check_options(options)
     except ExportError as error:
         raise command_line.CommandError(str(error)) from None
     if options.output is None:
-        options.output = outputs.OutputFile(Path(TARGETS[options.target].file_name))
+        options.output = outputs.OutputFile(Path(program.file_name))
         outputs.check_outputs(options, find_protected_places)
     output: outputs.OutputFile = options.output
     notes = [
@@ -74,7 +74,7 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
         own = output.beside(path)
         own.check()  # before the log is read
         of_imu = argparse.Namespace(**{**vars(options), "topic": list(topics), "output": own})
-        status = max(status, _calibrate(of_imu, compiling))
+        status = max(status, _calibrate(of_imu, program, compiling))
     return status
 
 
@@ -103,7 +103,7 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
         yield topics, place
 
 
-def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
+def _calibrate(options: argparse.Namespace, program: "Program", compiling: "Compilation") -> int:
     """Write the file of one IMU; return the exit status."""
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.request import build_imu
@@ -116,11 +116,9 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
         tables = Analysis(plan, compiling, options.cores, analysis.say).estimates()
         judged = list(_describe_logs(tables))
         try:
-            measured = None
-            if options.in_use not in (None, exports.NOT_MEASURED):
-                declared = plan.sensors[sensor] if options.sensor else None
-                stated = analysis.read_stated(options)
-                measured = exports.read_in_use(options.in_use, declared, options.motion, stated)
+            declared = plan.sensors[sensor] if options.sensor else None
+            stated = analysis.read_stated(options)
+            measured = exports.read_in_use(options.in_use, declared, options.motion, stated)
             sources = sorted(plan.sensors[sensor].log.channels.items(), reverse=True)  # gyro first
             topics = [one.variable for _, one in sources if str(one.variable).startswith("/")]
             request = exports.make_request(
@@ -132,30 +130,28 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
                 ros_topic=next(iter(topics), None),
             )
             imu = build_imu(tables, request, plan.run.results / "recordings")
-            options.output.write(exports.write_target(imu, options.target))
+            options.output.write(program.write(imu))
         except ExportError as error:
             print("\n".join(judged))
             raise command_line.CommandError(
                 f"{options.output.path}: not written: {error}"
             ) from None
-    print("\n".join([*_describe_file(imu, options), *judged]))
+    print("\n".join([*_describe_file(imu, program, options.output.path), *judged]))
     for line in _list_not_used(options):
         print(line)
     return 0
 
 
-def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
+def _describe_file(imu: "Imu", program: "Program", path: Path) -> Iterator[str]:
     """Yield what a file holds: its mode, and the values of gyro and accelerometer."""
     from imubench_pipeline.extensions.exports.mapping import map_to_family
     from imubench_pipeline.extensions.exports.reasons import value_kind
-    from imubench_pipeline.extensions.exports.targets import TARGETS
     from imubench_pipeline.report.practical import choose_page_unit
 
-    target = TARGETS[options.target]
-    yield f"{options.output.path}: for {target.program}"
+    yield f"{path}: for {program.title}"
     yield from wrap(imu.mode, _MAX_WIDTH, max_lines=4, placeholder=" ...")
     for quantity, axis in imu.axes.items():
-        mapped = map_to_family(axis.model, target.family, imu.horizon, imu.rate)
+        mapped = map_to_family(axis.model, program.family, imu.horizon, imu.rate)
         values = []
         for symbol in ("N", "B", "T_B", "K"):
             value = getattr(mapped.model, symbol)

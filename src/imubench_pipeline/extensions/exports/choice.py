@@ -27,14 +27,12 @@ _MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; furth
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen axis, of `of` axes, and the Allan deviation of its model at the horizon, SI."""
+    """The chosen axis."""
 
     recording: str
     channel: str
     method: str
     axis: AxisNoise
-    deviation: float
-    of: int
     determined: bool = True  # whether a slow term has a value; else it is only limited from above
     each: Mapping[str, "Choice"] = field(default_factory=dict)
     """The axes x, y and z with an estimate, each chosen among its own."""
@@ -101,19 +99,25 @@ def choose(
             for _, name, parameter in estimate.components()
             if name in _SLOW_PARAMETERS
         )
-        others: dict[texts.OtherAxes, list[_Estimated]] = defaultdict(list)
+        # Channels of the other estimates, by reason and recording.
+        others: dict[texts.OtherAxes, dict[str, list[str]]]
+        others = defaultdict(lambda: defaultdict(list))
         for other in everywhere:
             if other[1] not in channels or other == key:
                 continue
+            why: texts.OtherAxes = "not_median" if axis == MEDIAN else "less_noise"
             if other not in estimated:
-                others["other_device"].append(other)
+                why = "other_device"
             elif other not in (entry[1] for entry in ranked):
-                others["no_white_noise"].append(other)
-            else:
-                others["not_median" if axis == MEDIAN else "less_noise"].append(other)
-        notes = [*_describe_other_axes(others, horizon), *parameter_notes(estimate, determined)]
+                why = "no_white_noise"
+            others[why][other[0]].append(other[1])
+        notes = [
+            texts.axes_not_used(why, horizon, of_recordings, _MAX_NAMED_RECORDINGS)
+            for why, of_recordings in others.items()
+        ]
+        notes += parameter_notes(estimate, determined)
         noise = AxisNoise(estimate.model, origin, notes)
-        return Choice(*key, noise, deviation, len(of), determined)
+        return Choice(*key, noise, determined)
 
     each = {
         name[-1]: take([name], "estimate")
@@ -160,19 +164,6 @@ def pool_recordings(
     notes = [note for note in choice.axis.notes if note not in single]
     axis = replace(choice.axis, model=pooled, origin=origin, notes=notes)
     return replace(choice, axis=axis, determined=True)
-
-
-def _describe_other_axes(
-    others: Mapping[texts.OtherAxes, Sequence[_Estimated]], horizon: float
-) -> list[str]:
-    """List the axes or estimates that were not chosen, by reason."""
-    statements = []
-    for why, keys in others.items():
-        of: dict[str, list[str]] = defaultdict(list)
-        for recording, channel, _ in keys:
-            of[recording].append(channel)
-        statements.append(texts.axes_not_used(why, horizon, of, _MAX_NAMED_RECORDINGS))
-    return statements
 
 
 def parameter_notes(estimate: Estimate, determined: bool = True) -> list[str]:

@@ -17,6 +17,7 @@ from imubench_pipeline.tables import outputs
 if TYPE_CHECKING:
     from imubench_pipeline.extensions.exports.imu import Imu
     from imubench_pipeline.extensions.exports.in_use import InUseNoise
+    from imubench_pipeline.extensions.exports.programs import Program
     from imubench_pipeline.run.analysis.project import Stated
 
 NOT_MEASURED = Path()  # --in-use without a log
@@ -53,21 +54,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
     )
     mode = parser.add_mutually_exclusive_group()
-    mode.add_argument(
-        "--bench",
-        dest="mode",
-        action="store_const",
-        const="bench",
-        help="the noise at rest; default, but not for programs that fly",
-    )
-    mode.add_argument(
-        "--bounded",
-        dest="mode",
-        action="store_const",
-        const="bounded",
-        help="the smallest model above the upper 95 %% limit of the measured curve, from 1 s to "
-        "--horizon",
-    )
+    for name, words in (
+        ("bench", "the noise at rest; default, but not for programs that fly"),
+        (
+            "bounded",
+            "the smallest model above the upper 95 %% limit of the measured curve, from 1 s to "
+            "--horizon",
+        ),
+    ):
+        mode.add_argument(f"--{name}", dest="mode", action="store_const", const=name, help=words)
     mode.add_argument(
         "--in-use",
         type=Path,
@@ -115,14 +110,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="largest permitted ratio of the Allan deviation of a bound to its limit; default: 3",
     )
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
-    parser.add_argument(
-        "--latitude",
-        type=command_line.make_number_type(
-            -90.0, 90.0, "a latitude of -90 to 90, in degrees", float
-        ),
-        metavar="DEG",
-        help="for gravity",
-    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -130,8 +117,9 @@ def run(options: argparse.Namespace) -> int:
     from imubench_pipeline.extensions.exports.imu import ExportError
 
     try:
-        imu = build_from_datasheet(options) if options.datasheet else _build_from_results(options)
-        content = write_target(imu, options.target)
+        program = check_options(options)
+        imu = _build_from_datasheet(options) if options.datasheet else _build_from_results(options)
+        content = program.write(imu)
     except ExportError as error:
         raise command_line.CommandError(str(error)) from None
     if options.output is not None:
@@ -144,20 +132,18 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def check_options(options: argparse.Namespace) -> None:
-    """Raise CommandError or ExportError if options of a file do not belong together."""
+def check_options(options: argparse.Namespace) -> "Program":
+    """Return the program of a file, and complete the options of its mode.
+
+    Raises CommandError or ExportError if options do not belong together.
+    """
     from imubench_pipeline.extensions.exports.of_models import find_target
 
     if options.inflation != 1.0 and not options.because:
         raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
-    find_target(options.target)
-
-
-def write_target(imu: "Imu", target: str) -> str | bytes:
-    """Return the content of the file of a program."""
-    from imubench_pipeline.extensions.exports.targets import TARGETS
-
-    return TARGETS[target].write(imu)
+    if options.in_use is not None:
+        options.mode = "in-use"
+    return find_target(options.target)
 
 
 def make_request(options: argparse.Namespace, **values: Any) -> Any:
@@ -165,8 +151,6 @@ def make_request(options: argparse.Namespace, **values: Any) -> Any:
     from imubench_pipeline.extensions.exports.request import Request
 
     own = vars(options) | values
-    if options.in_use is not None:
-        own["mode"] = "in-use"
     return Request(**{each.name: own[each.name] for each in fields(Request) if each.name in own})
 
 
@@ -176,7 +160,6 @@ def _build_from_results(options: argparse.Namespace) -> "Imu":
 
     if options.results is None:
         raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
-    check_options(options)
     tables, folder = load(options.results), recordings_of(options.results)
     sensor = options.sensor
     if sensor is None:
@@ -186,14 +169,16 @@ def _build_from_results(options: argparse.Namespace) -> "Imu":
                 f"which sensor of the results? expected --sensor NAME: {', '.join(names)}"
             )
         (sensor,) = names
-    measured = None
-    if options.in_use not in (None, NOT_MEASURED):
-        known = read_sensors(list_folders(Run().sensors, "sensors")).get(sensor)
-        measured = read_in_use(options.in_use, known, options.motion)
+    known = _read_catalogue().get(sensor) if options.in_use else None
+    measured = read_in_use(options.in_use, known, options.motion)
     return build_imu(tables, make_request(options, sensor=sensor, in_use=measured), folder)
 
 
-def build_from_datasheet(options: argparse.Namespace) -> "Imu":
+def _read_catalogue() -> Mapping[str, Sensor]:
+    return read_sensors(list_folders(Run().sensors, "sensors"))
+
+
+def _build_from_datasheet(options: argparse.Namespace) -> "Imu":
     """Return the noise by the printed figures of a sensor of the catalogue."""
     from imubench_pipeline.extensions.exports.from_datasheet import build_printed_imu
     from imubench_pipeline.extensions.exports.imu import ExportError
@@ -202,33 +187,29 @@ def build_from_datasheet(options: argparse.Namespace) -> "Imu":
 
     if options.results is not None:
         raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
-    check_options(options)
     if options.mode == "bounded":
         raise ExportError("a bound needs a log: expected --datasheet without --bounded")
-    found = sensors.find_sensors(
-        read_sensors(list_folders(Run().sensors, "sensors")), options.datasheet
-    )
+    found = sensors.find_sensors(_read_catalogue(), options.datasheet)
     name = options.datasheet.lower()
     if name not in found:
         near = f"; there are: {', '.join(found)}" if found else "; `imubench sensors` lists all"
         if len(found) != 1:
             raise ExportError(f"no sensor {options.datasheet!r}{near}")
         (name,) = found
-    keys = ("horizon", "inflation", "because", "latitude", "rate")
+    keys = ("horizon", "inflation", "because", "rate")
     imu = build_printed_imu(name, found[name], **{key: getattr(options, key) for key in keys})
-    measured = None
-    if options.in_use not in (None, NOT_MEASURED):
-        measured = read_in_use(options.in_use, None, options.motion)
-    mode = choose_mode("in-use" if options.in_use is not None else options.mode, options.target)
+    measured = read_in_use(options.in_use, None, options.motion)
+    mode = choose_mode(options.mode, options.target)
     return apply_mode(imu, TARGETS[options.target], mode, measured)
 
 
 def read_in_use(
-    path: Path, sensor: Sensor | None, cutoff: float, stated: "Stated | None" = None
-) -> "Mapping[str, InUseNoise]":
-    """Return the noise of each channel of a log in use; ``sensor``: its format; None: drafted.
+    path: Path | None, sensor: Sensor | None, cutoff: float, stated: "Stated | None" = None
+) -> "Mapping[str, InUseNoise] | None":
+    """Return the noise of each channel of a log in use; None without a log.
 
-    ``stated`` completes the draft. Raises ExportError if the log cannot be read, or is too short.
+    ``sensor`` has its format; None: drafted, and ``stated`` completes the draft. Raises ExportError
+    if the log cannot be read, or is too short.
     """
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.in_use import measure_in_use
@@ -239,6 +220,8 @@ def read_in_use(
     from imubench_pipeline.settings.sensor import merged_log
     from imubench_pipeline.settings.validation import parse
 
+    if path in (None, NOT_MEASURED):
+        return None
     if not path.exists():
         raise ExportError(f"{path}: no such file; expected a log in use")
     if sensor is None:

@@ -1,17 +1,11 @@
 """The noise of a sensor by its datasheet alone, for the file of a program."""
 
 from imubench_pipeline.datasheets.printed_noise import PrintedNoise, read_printed_noise
-from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.extensions.exports.imu import (
-    AxisNoise,
-    ExportError,
-    Imu,
-    compute_normal_gravity,
-)
+from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.units import parse_quantity
 
-_CAUTION = "these are figures of a data sheet and of its class, and not of a log"
+_CAUTION = "these are figures of a datasheet and of its class, and not of a log"
 _NAMES = {
     "N": "N, the two-sided density: a one-sided density over sqrt(2), or the random walk",
     "flicker": "B: the printed bias instability is the lowest point of the curve, 0.664 B",
@@ -26,13 +20,12 @@ def build_printed_imu(
     horizon: float = 60.0,
     inflation: float = 1.0,
     because: str | None = None,
-    latitude: float | None = None,
     rate: float | None = None,
 ) -> Imu:
     """Return the noise that a datasheet prints, with limits of the class for what it does not.
 
-    ``horizon`` is in s, ``latitude`` in degrees, ``rate`` in Hz, by default the highest of the
-    sensor. Raises ExportError without a rate.
+    ``horizon`` is in s, ``rate`` in Hz, by default the highest of the sensor. Raises ExportError
+    without a rate.
     """
     if rate is None and sensor.rate is None:
         raise ExportError(f"the file of {name} states no rate; state it (--rate)")
@@ -46,10 +39,8 @@ def build_printed_imu(
     return Imu(
         sensor=f"{sensor.vendor} {sensor.model}",
         rate=rate or parse_quantity(sensor.rate or "", "frequency"),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=horizon,
-        gravity=STANDARD_GRAVITY if latitude is None else compute_normal_gravity(latitude),
         inflation=inflation,
         because=because,
         simulated=False,
@@ -69,4 +60,4 @@ def _make_axis(noise: PrintedNoise, document: str) -> AxisNoise:
             )
         else:
             notes.append(f"{meaning}; NOT PRINTED: the worst of its class")
-    return AxisNoise(noise.models["in_use"], f"data sheet {document}", notes)
+    return AxisNoise(noise.models["in_use"], f"datasheet {document}", notes)

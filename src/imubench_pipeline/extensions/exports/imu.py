@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
@@ -171,12 +170,10 @@ class Imu:
 
     sensor: str
     rate: float  # of the samples that the program will get, Hz
-    gyro: AxisNoise | None = None  # None: no estimate
-    accel: AxisNoise | None = None
+    estimated: Mapping[str, AxisNoise]  # gyro, accel, or both, without the inflation
     horizon: float = 60.0
     """Longest time that the program predicts without a measurement, s. A replacement for a model
     that the program does not support has the same Allan variance at this time."""
-    gravity: float = STANDARD_GRAVITY  # m/s^2
     inflation: float = 1.0  # factor on all densities and amplitudes, not on variances
     because: str | None = None
     """Reason of the inflation, or of the use of a recording that is excluded from decisions."""
@@ -187,7 +184,7 @@ class Imu:
     ros_topic: str = "/imu0"  # of the samples
 
     def __post_init__(self) -> None:
-        for name in ("rate", "horizon", "gravity", "inflation"):
+        for name in ("rate", "horizon", "inflation"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ExportError(f"{name} is {value}, expected a number above 0")
@@ -202,12 +199,6 @@ class Imu:
     def axes(self) -> dict[str, AxisNoise]:
         """The quantities that have an estimate, with the inflation in their models."""
         return {name: axis.inflated(self.inflation) for name, axis in self.estimated.items()}
-
-    @property
-    def estimated(self) -> dict[str, AxisNoise]:
-        """The quantities that have an estimate, without the inflation."""
-        both = {"gyro": self.gyro, "accel": self.accel}
-        return {name: axis for name, axis in both.items() if axis is not None}
 
     def require_both(self) -> None:
         """Raise ExportError if there is no estimate of gyro or accelerometer."""
@@ -225,20 +216,3 @@ def inflate(model: NoiseModel, factor: float) -> NoiseModel:
     further = [term.scaled(factor) for term in model.further]
     lines = [line.scaled(factor) for line in model.sinusoids]
     return replace(model, **scaled, further=further, sinusoids=lines)
-
-
-def compute_normal_gravity(latitude: float) -> float:
-    """Return gravity on the WGS 84 ellipsoid, m/s^2, at a latitude in degrees; else ExportError.
-
-    Somigliana's formula: NIMA TR8350.2, "Department of Defense World Geodetic System 1984",
-    equation 4-1.
-    """
-    if not abs(latitude) <= 90.0:
-        raise ExportError(f"the latitude is {latitude}, expected degrees from -90 to 90")
-    square = math.sin(math.radians(latitude)) ** 2
-    first_eccentricity_squared = 6.69437999014e-3
-    return (
-        9.7803253359
-        * (1.0 + 1.931852652458e-3 * square)
-        / math.sqrt(1.0 - first_eccentricity_squared * square)
-    )

@@ -40,10 +40,6 @@ class Mapped:
 
     model: NoiseModel  # for the program: N, at most one B with T_B, and K
     words: Sequence[str]  # description of the replacement and its error
-    half: float = 0.0
-    twice: float = 0.0
-    """Relative error of the Allan deviation at half and at twice the horizon; 0: exact."""
-    most: float = 0.0  # the relative error of largest magnitude at a tau up to the horizon
 
 
 def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
@@ -114,11 +110,13 @@ def _make_process(variance: float, horizon: float, T_B: float) -> GaussMarkov:
     return GaussMarkov(compute_bias_instability(density, T_B), T_B)
 
 
-def map_to_family(model: NoiseModel, family: str, horizon: float, rate: float) -> Mapped:
-    """Return a model with the terms of a family, N+K, N+GM or N+GM+K."""
+def map_to_family(
+    model: NoiseModel, family: str, horizon: float, rate: float, time: float | None = None
+) -> Mapped:
+    """Return a model with the terms of a family, N+K, N+GM or N+GM+K; `time` as in `as_process`."""
     if family == "N+K":
         return as_walk(model, horizon, rate)
-    return as_process(model, horizon, rate) if family == "N+GM" else Mapped(model, [])
+    return as_process(model, horizon, rate, time=time) if family == "N+GM" else Mapped(model, [])
 
 
 def bound_walk(curve: AllanCurve, N: float, horizon: float) -> float:
@@ -185,4 +183,4 @@ def _describe_replacement(
         f"at {number_text(horizon / 2)} s and {100 * twice:+.1f} % at {number_text(2 * horizon)} "
         f"s. Below the horizon the largest difference is {100 * largest:+.1f} %, at {at_largest} s"
     )
-    return Mapped(replacement, [words, *_describe_omitted_terms(model)], half, twice, largest)
+    return Mapped(replacement, [words, *_describe_omitted_terms(model)])

@@ -7,7 +7,7 @@ the authors of the program use or recommend.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,7 +15,7 @@ from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.mapping import as_walk
-from imubench_pipeline.extensions.exports.targets import Target
+from imubench_pipeline.extensions.exports.programs import Program
 
 Mode = Literal["bench", "bounded", "in-use"]
 
@@ -28,50 +28,44 @@ class Floor:
 
     source: str
     factor: float = 1.0  # on all densities at rest
-    densities: Callable[[float], Densities] = lambda _: {}  # for a rate in Hz
+    gyro: tuple[float, float] = (0.0, 0.0)  # deviations per step: N and K over its root, SI
+    accel: tuple[float, float] = (0.0, 0.0)
+    step: float | None = None  # s; None: from one sample to the next
+
+    def densities(self, rate: float) -> Densities:
+        """Return N and K for samples at a rate, Hz."""
+        root = math.sqrt(self.step or 1.0 / rate)
+        steps = {"gyro": self.gyro, "accel": self.accel}
+        return {name: (N * root, K * root) for name, (N, K) in steps.items()}
 
 
 _TIMES_10 = Floor(
     "10 times the noise at rest, the least that the documentation of OpenVINS recommends", 10.0
 )
-
-
-def _per_step(gyro: tuple[float, float], accel: tuple[float, float], step: float) -> Densities:
-    """Return the densities of noises of a filter step, s, as of PX4: value times root of step."""
-    root = math.sqrt(step)
-    return {"gyro": (gyro[0] * root, gyro[1] * root), "accel": (accel[0] * root, accel[1] * root)}
-
-
-_EKF2 = Floor(
-    "the defaults of EKF2", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 3e-3), 0.01)
-)
-
 _TEN_TIMES = ("kalibr", "openvins", "basalt", "orb-slam3", "gtsam", "matlab-factor", "ceres")
+_EKF2 = Floor("the defaults of EKF2", gyro=(0.015, 1e-3), accel=(0.35, 3e-3), step=0.01)
 
 FLOORS: Mapping[str, Floor] = {
     **dict.fromkeys(_TEN_TIMES, _TIMES_10),
     "lio-sam": Floor(
         "the example configuration of LIO-SAM",
-        densities=lambda _: {"gyro": (1.564e-3, 3.564e-5), "accel": (3.994e-3, 6.436e-5)},
+        gyro=(1.564e-3, 3.564e-5),
+        accel=(3.994e-3, 6.436e-5),
+        step=1.0,  # densities
     ),
     "fast-lio": Floor(
         "the example configurations of FAST-LIO",
-        densities=lambda rate: dict.fromkeys(
-            ("gyro", "accel"), (math.sqrt(0.1 / rate), math.sqrt(1e-4 / rate))
-        ),
+        gyro=(math.sqrt(0.1), math.sqrt(1e-4)),
+        accel=(math.sqrt(0.1), math.sqrt(1e-4)),
     ),
     "vins-fusion": Floor(
         "the example configurations of VINS-Fusion",
-        densities=lambda rate: {
-            "gyro": (0.01 / math.sqrt(2.0 * rate), 1e-4 / math.sqrt(rate)),
-            "accel": (0.1 / math.sqrt(2.0 * rate), 1e-3 / math.sqrt(rate)),
-        },
+        gyro=(0.01 / math.sqrt(2.0), 1e-4),
+        accel=(0.1 / math.sqrt(2.0), 1e-3),
     ),
     "px4": _EKF2,
     "px4-mavparm": _EKF2,
-    "ardupilot": Floor(
-        "the defaults of EKF3", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 0.02), 0.012)
-    ),
+    "ardupilot": Floor("the defaults of EKF3", gyro=(0.015, 1e-3), accel=(0.35, 0.02), step=0.012),
 }
 """Floors by target. Sources: rpng/open_vins, docs/gs-calibration.dox; HKUST-Aerial-Robotics/
 VINS-Fusion, config/euroc/euroc_mono_imu_config.yaml; TixiaoShan/LIO-SAM, config/params.yaml;
@@ -92,7 +86,7 @@ def choose_mode(mode: Mode | None, target: str) -> Mode:
 
 
 def apply_mode(
-    imu: Imu, target: Target, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
+    imu: Imu, target: Program, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
 ) -> Imu:
     """Return the noise of a sensor for a mode, with the mode in words.
 
@@ -121,7 +115,7 @@ def apply_mode(
         return _raise_to(imu, target, floors, 1.0, words)
     if target.name not in FLOORS:
         raise ExportError(
-            f"nobody recommends noise in use for {target.program}; expected --in-use LOG, a log of "
+            f"nobody recommends noise in use for {target.title}; expected --in-use LOG, a log of "
             "the sensor with motors on or on the way"
         )
     floor = FLOORS[target.name]
@@ -129,12 +123,10 @@ def apply_mode(
     return _raise_to(imu, target, floor.densities(imu.rate), floor.factor, words)
 
 
-def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words: str) -> Imu:
+def _raise_to(imu: Imu, target: Program, floors: Densities, factor: float, words: str) -> Imu:
     """Return the noise raised to densities N and K, or by a factor."""
 
-    def raise_axis(axis: AxisNoise | None, quantity: str) -> AxisNoise | None:
-        if axis is None:
-            return None
+    def raise_axis(axis: AxisNoise, quantity: str) -> AxisNoise:
         least_N, least_K = floors.get(quantity, (0.0, 0.0))
         model = inflate(axis.model, factor)
         notes = list(axis.notes)
@@ -144,10 +136,9 @@ def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words:
             notes += mapped.words
         model = replace(model, N=max(model.N, least_N))
         notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
-        raised = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
-        each = {letter: one for letter, one in raised.items() if one is not None}
+        each = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
         limited = axis.slow_limited and model.K == axis.model.K
         return replace(axis, model=model, notes=notes, each=each, slow_limited=limited)
 
-    gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
-    return replace(imu, gyro=gyro, accel=accel, mode=words)
+    raised = {name: raise_axis(axis, name) for name, axis in imu.estimated.items()}
+    return replace(imu, estimated=raised, mode=words)

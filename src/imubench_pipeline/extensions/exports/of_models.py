@@ -3,15 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.extensions.exports.imu import (
-    AxisNoise,
-    ExportError,
-    Imu,
-    compute_normal_gravity,
-)
+from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.modes import Mode, apply_mode, choose_mode
-from imubench_pipeline.extensions.exports.targets import TARGETS, Target
+from imubench_pipeline.extensions.exports.programs import Program
+from imubench_pipeline.extensions.exports.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables.files import write_content
 from imubench_pipeline.units import parse_setting
@@ -26,7 +21,6 @@ def export(
     name: str = "sensor",
     mode: Mode | None = None,
     horizon: float | str = 60.0,
-    latitude: float | None = None,
 ) -> str | bytes:
     """Return the input file of a filter or simulator for noise models.
 
@@ -48,8 +42,6 @@ def export(
     horizon : float or str
         Longest time without a measurement, s, for the replacement of terms that the program does
         not support.
-    latitude : float, optional
-        For gravity, degrees.
 
     Returns
     -------
@@ -74,26 +66,26 @@ def export(
     if mode == "bounded":
         raise ValueError("a bound needs a log: expected Estimates.export")
     program = find_target(target)
-    axes = {key: AxisNoise(model, "a given model") for key, model in models.items()}
+    axes = {
+        key: AxisNoise(models[key], "a given model") for key in ("gyro", "accel") if key in models
+    }
     built = Imu(
         sensor=name,
         rate=parse_setting(rate, "frequency", "rate"),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=parse_setting(horizon, "time", "horizon"),
-        gravity=STANDARD_GRAVITY if latitude is None else compute_normal_gravity(latitude),
     )
     return write_file(program, apply_mode(built, program, choose_mode(mode, target)), path)
 
 
-def find_target(target: str) -> Target:
+def find_target(target: str) -> Program:
     """Return a program by its name; ExportError names all if it is not known."""
     if target not in TARGETS:
         raise ExportError(f"target {target!r} is not known; there are: {', '.join(TARGETS)}")
     return TARGETS[target]
 
 
-def write_file(program: Target, imu: Imu, path: str | Path | None) -> str | bytes:
+def write_file(program: Program, imu: Imu, path: str | Path | None) -> str | bytes:
     """Return the file of a program, and write it if there is a path."""
     content = program.write(imu)
     if path is not None:

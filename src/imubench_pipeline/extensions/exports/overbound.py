@@ -7,7 +7,7 @@ the sensor. This module finds the smallest model of a family (N+K, N+GM, N+GM+K)
 - the spectral density lies above the fitted one in a band, by default from a tenth of 1 / horizon
   (a filter has averaged for longer than it then goes without a measurement) to half the rate;
 - the variances of the first and the second integral lie above the fitted ones at every time up to
-  the horizon (`imubench_pipeline.extensions.exports.growth`).
+  the horizon (`growth`).
 
 A bound on the Allan variance alone is not enough. It hardly resolves how the power is distributed
 within an octave or two, and the covariance of a filter depends on that distribution. A spectral
@@ -49,7 +49,6 @@ from scipy.optimize import linprog, minimize_scalar
 from imubench_pipeline import noise
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.extensions.exports import reasons as texts
-from imubench_pipeline.extensions.exports.growth import growth
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.numbers import number_text
 
@@ -68,7 +67,6 @@ _ROUNDING_MARGIN = 1e-9
 class Limits:
     """Lower limits of a model."""
 
-    kind: str  # the limited quantity, for texts
     x: Array  # shape (m,); tau or time, s, or frequency, Hz
     value: Array  # shape (m,); lower limit there
     of_term: Callable[[noise.Term], Array]  # contribution of a term to the limited quantity at `x`
@@ -172,9 +170,10 @@ _ALLAN_PEAK_FREQUENCY = 0.37
 
 The function is sin^4(x) / x^2 with x = pi f tau; the constant is x at its maximum, over pi."""
 
-_MIN_FREQUENCY_TIMES_HORIZON = 0.1  # default of the lowest frequency of the band, in 1 / horizon
+_MIN_FREQUENCY_TIMES_HORIZON = 0.1  # lowest frequency of the band, in 1 / horizon
 _POINTS_A_DECADE = 12
 _MAX_TIME_RATIO = 30.0  # max. T_B of the search, over the larger of the longest tau and the horizon
+_CONFIDENCE = 0.95  # of the limits, simultaneously for all tau
 MAX_EXCESS = 3.0
 """Default of the max. ratio of a model's Allan deviation to its limit."""
 
@@ -184,8 +183,8 @@ _MAX_HORIZON_OVER_T_B = 2.0
 _MIN_FREQUENCY_RATIO = 1e-4
 """Lowest frequency at which densities are compared, over the lowest of the band."""
 
-_MAX_RATIO_AT_CONTACT = 1.01
-"""Max. ratio of a model to a limit for which the model is reported to touch the limit."""
+_FLICKER_TAU_RATIO = 4.0
+"""Longest tau of the approximation of flicker noise, over the longest time of the growth."""
 
 
 @dataclass(frozen=True)
@@ -193,62 +192,25 @@ class Overbound:
     """A model that lies above its limits."""
 
     model: noise.NoiseModel
-    family: Family
-    horizon: float  # s
-    shortest: float  # tau and time, s
-    longest: float  # tau, s
-    band: tuple[float, float]  # lowest and highest frequency, Hz
-    tau: Array  # (m,): up to ``longest``, s
-    ratio: Array  # (m,): Allan variance of the model over the measured one
-    at_minimum: float  # ``ratio`` at the minimum of the measured curve
-    touches: dict[str, float]
-    """Tau, frequency or time where the model is within 1 % of a limit, by kind of limit."""
+    band: tuple[float, float]  # lowest and highest frequency of the bounded density, Hz
     excess: tuple[float, float]
     """Max. ratio of the model's Allan deviation to its limit, and its tau, s. It depends on the
     family; a longer log does not reduce it."""
-    passed_below: float | None
-    """Frequency, Hz, below which the fitted density is above the density of the model; None: it is
-    not, down to a ten-thousandth of the lowest frequency of the band."""
+    words: Sequence[str]  # its size, and the range of the bounded density, for the head of a file
     warning: str | None = None
     """Why the family does not suit the horizon, with the excess of the other families."""
 
-    @property
-    def words(self) -> str:
-        """Description of the model, for the head of a file."""
-        low, high = (number_text(frequency, 3) for frequency in self.band)
-        return (
-            f"this is the smallest {self.family} above the measured Allan variance at every tau "
-            f"from {number_text(self.shortest, 3)} to {number_text(self.longest)} s (95 % for all "
-            f"together). It is also above the fitted spectral density from {low} to {high} Hz, "
-            f"and the growth of the integrals up to {number_text(self.horizon)} s. Its Allan "
-            "deviation is "
-            f"{number_text(math.sqrt(self.at_minimum), 3)} times the measured one at the minimum "
-            "of the curve"
-        )
 
-    @property
-    def density_words(self) -> str:
-        """Range of frequencies where the density is bounded, for the head of a file."""
-        lowest, passed = self.band[0], self.passed_below
-        below = "Below, the fitted density does not exceed the bound, but is less certain"
-        if passed is not None:
-            below = f"The fitted density exceeds the bound below {number_text(passed, 3)} Hz"
-        return (
-            f"the spectral density is bounded above {number_text(lowest, 3)} Hz only. {below}. "
-            f"Filters that average for longer than {number_text(1.0 / lowest)} s are not covered"
-        )
-
-
-def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.95) -> Array:
-    """Return simultaneous upper confidence limits of an Allan variance.
+def simultaneous_upper(curve: AllanCurve, longest: float) -> Array:
+    """Return simultaneous upper 95 % confidence limits of an Allan variance.
 
     They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
-    The true curve lies below the limits at every tau up to ``longest``, s, with the probability
-    ``confidence``. The limits are at every tau of the curve, shape (m,), in its unit squared.
+    The true curve lies below the limits at every tau up to ``longest``, s, with this probability.
+    The limits are at every tau of the curve, shape (m,), in its unit squared.
     """
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]
     octaves = 1.0 + math.log2(n[-1] / n[0])
-    level = 1.0 - (1.0 - confidence) / octaves
+    level = 1.0 - (1.0 - _CONFIDENCE) / octaves
     return curve.limits(2.0 * level - 1.0)[1] ** 2
 
 
@@ -261,8 +223,6 @@ def overbound(
     horizon: float = 60.0,
     longest: float | None = None,
     shortest: float = 0.0,
-    band: tuple[float | None, float | None] = (None, None),
-    confidence: float = 0.95,
     drawn: Sequence[noise.NoiseModel] = (),
     most_excess: float = MAX_EXCESS,
 ) -> Overbound:
@@ -272,10 +232,8 @@ def overbound(
     they count only by their part of the measured curve. The rate is in Hz. ``family`` are the terms
     that the model may have; ``horizon`` is the longest time that the filter predicts without a
     measurement, s, and by default also ``longest``, the longest tau. ``shortest`` is the shortest
-    tau and time, s, by default one sample. ``band`` is the lowest and highest frequency of the
-    bounded density, Hz, by default a tenth of 1 / horizon, and half the rate or 1 / ``shortest``;
-    lower its end for a sensor that is filtered below half the rate. ``confidence`` is of the
-    limits, simultaneously for all tau. ``drawn`` are models drawn jointly from the posterior of the
+    tau and time, s, by default one sample. The density is bounded from a tenth of 1 / horizon to
+    half the rate or 1 / ``shortest``. ``drawn`` are models drawn jointly from the posterior of the
     fit; without them the fitted model is widened by the factors of the measured curve.
     ``most_excess`` is the max. ratio of the model's Allan deviation to its limit.
 
@@ -285,19 +243,19 @@ def overbound(
     """
     reach = longest or horizon
     begins = max(shortest, 1.0 / rate)
-    highest = band[1] or min(0.5 * rate, 1.0 / begins)
-    ends = (band[0] or _MIN_FREQUENCY_TIMES_HORIZON / horizon, highest)
-    limits = limits_of(curve, fitted, rate, horizon, (begins, reach), ends, confidence, drawn)
+    band = (_MIN_FREQUENCY_TIMES_HORIZON / horizon, min(0.5 * rate, 1.0 / begins))
+    limits = limits_of(curve, fitted, rate, horizon, (begins, reach), band, drawn)
     times = (2.0 / rate, _MAX_TIME_RATIO * max(horizon, reach))
     model = find_smallest(limits, family, times)
     excess = _find_excess(limits[0], model)
     unsuited = None
     processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
-    shortest = min((process.T_B for process in processes), default=math.inf)
-    if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * shortest:
+    least_time = min((process.T_B for process in processes), default=math.inf)
+    if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * least_time:
         unsuited = (
-            f"a random walk cannot follow a Gauss-Markov process of T_B = {number_text(shortest)} "
-            f"s beyond {number_text(_MAX_HORIZON_OVER_T_B * shortest)} s"
+            f"a random walk cannot follow a Gauss-Markov process of T_B = "
+            f"{number_text(least_time)} s beyond "
+            f"{number_text(_MAX_HORIZON_OVER_T_B * least_time)} s"
         )
     warning = None
     if excess[0] > most_excess or unsuited:
@@ -309,37 +267,30 @@ def overbound(
         allowed = min(excess[0], most_excess)
         better = [(other, value) for other, value in others.items() if value < allowed]
         least = min([excess[0], *others.values()])
-        offer = texts.families_compared(family, excess, unsuited, better, least)
+        warning = texts.families_compared(family, excess, unsuited, better, least)
         if excess[0] > most_excess:
-            raise ValueError(f"{offer}. At most {most_excess:g} times is allowed")
-        warning = offer
+            raise ValueError(f"{warning}. At most {most_excess:g} times is allowed")
     within = (curve.tau >= begins * (1.0 - 1e-9)) & (curve.tau <= reach * (1.0 + 1e-9))
     tau, measured = curve.tau[within], curve.variance[within]
-    ratio = model.allan_variance(tau, rate) / measured
-    touches = {}
-    for limit in limits:
-        above = limit.ratio(model)
-        if above.min() < _MAX_RATIO_AT_CONTACT:
-            touches[limit.kind] = float(limit.x[np.argmin(above)])
-    lowest = float(ratio[np.argmin(measured)])
-    frequency = np.geomspace(ends[0], _MIN_FREQUENCY_RATIO * ends[0], 400)
+    lowest = int(np.argmin(measured))
+    ratio = float(model.allan_variance(tau, rate)[lowest] / measured[lowest])
+    frequency = np.geomspace(band[0], _MIN_FREQUENCY_RATIO * band[0], 400)
     passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
-    below = float(frequency[passed[0]]) if len(passed) else None
-    return Overbound(
-        model,
-        family,
-        horizon,
-        begins,
-        reach,
-        ends,
-        tau,
-        ratio,
-        lowest,
-        touches,
-        excess,
-        below,
-        warning,
-    )
+    below = "Below, the fitted density does not exceed the bound, but is less certain"
+    if len(passed):
+        passed_at = number_text(float(frequency[passed[0]]), 3)
+        below = f"The fitted density exceeds the bound below {passed_at} Hz"
+    low, high = (number_text(end, 3) for end in band)
+    words = [
+        f"this is the smallest {family} above the measured Allan variance at every tau from "
+        f"{number_text(begins, 3)} to {number_text(reach)} s (95 % for all together). It is also "
+        f"above the fitted spectral density from {low} to {high} Hz, and the growth of the "
+        f"integrals up to {number_text(horizon)} s. Its Allan deviation is "
+        f"{number_text(math.sqrt(ratio), 3)} times the measured one at the minimum of the curve",
+        f"the spectral density is bounded above {low} Hz only. {below}. Filters that average for "
+        f"longer than {number_text(1.0 / band[0])} s are not covered",
+    ]
+    return Overbound(model, band, excess, words, warning)
 
 
 def _find_excess(limit: Limits, model: noise.NoiseModel) -> tuple[float, float]:
@@ -349,6 +300,22 @@ def _find_excess(limit: Limits, model: noise.NoiseModel) -> tuple[float, float]:
     return math.sqrt(float(above[worst])), float(limit.x[worst])
 
 
+def growth(model: noise.NoiseModel, time: Array, rate: float) -> tuple[Array, Array]:
+    """Return the variances of the first and second integral of noise at times, s: shapes (m,).
+
+    The states were known at time 0. With h(s) the impulse response from the driving white noise of
+    density S to the noise, integrated once (angle or velocity) or twice (position), Var(t) =
+    S int_0^t h(s)^2 ds (`noise.terms.base.Term.growth_from_known`). White noise, Gauss-Markov
+    processes, random walk and flicker noise contribute; the processes that approximate flicker
+    noise begin at half the period of the rate, Hz. Deterministic terms (ramp, lines) and
+    quantization noise, which does not grow, do not contribute.
+    """
+    longest = max(_FLICKER_TAU_RATIO * float(time.max()), 2.0 / rate)
+    grown = [term.growth_from_known(time) for term in model.realised(1.0 / rate, longest)]
+    first, second = np.sum(grown, axis=0) if grown else np.zeros((2, len(time)))
+    return first, second
+
+
 def limits_of(
     curve: AllanCurve,
     fitted: noise.NoiseModel,
@@ -356,7 +323,6 @@ def limits_of(
     horizon: float,
     reach: tuple[float, float],
     band: tuple[float, float],
-    confidence: float = 0.95,
     drawn: Sequence[noise.NoiseModel] = (),
 ) -> list[Limits]:
     """Return the limits on Allan variance, density and two integrals (see `overbound`).
@@ -370,7 +336,7 @@ def limits_of(
         )
     if longest > curve.tau[-1] * (1.0 + 1e-9):
         raise ValueError(f"the curve ends at {curve.tau[-1]:g} s, before {longest:g} s")
-    upper = simultaneous_upper(curve, longest, confidence)
+    upper = simultaneous_upper(curve, longest)
     inside = (curve.tau >= shortest * (1.0 - 1e-9)) & (curve.tau < longest * (1.0 - 1e-9))
     tau = np.append(curve.tau[inside], longest)
     limit = np.exp(np.interp(np.log(tau), np.log(curve.tau), np.log(upper)))
@@ -379,8 +345,7 @@ def limits_of(
     time = np.geomspace(shortest, horizon, count_points(shortest, horizon, _POINTS_A_DECADE))
 
     def of_model(model: noise.NoiseModel) -> Array:
-        grown = growth(model, time, rate)
-        return np.concatenate((model.psd(frequency, rate), grown.first, grown.second))
+        return np.concatenate((model.psd(frequency, rate), *growth(model, time, rate)))
 
     if drawn:
         # Factors that bound a share of the draws simultaneously at every point (sup-t band): the
@@ -388,7 +353,7 @@ def limits_of(
         above = np.log(np.array([*map(of_model, drawn)]) / of_model(fitted))
         spread = np.maximum(np.sqrt(np.mean(above**2, axis=0)), 1e-12)
         furthest = (above / spread).max(axis=1)
-        bound = max(float(np.quantile(furthest, confidence)), 0.0)
+        bound = max(float(np.quantile(furthest, _CONFIDENCE)), 0.0)
         wider = of_model(fitted) * np.exp(bound * spread)
     else:
         looked = np.concatenate((_ALLAN_PEAK_FREQUENCY / frequency, time, time))
@@ -397,8 +362,8 @@ def limits_of(
     density, first, second = np.split(wider, [len(frequency), len(frequency) + len(time)])
     n = tau * rate
     return [
-        Limits("Allan variance", tau, limit, lambda t: t.sampled_allan_variance(n, 1.0 / rate)),
-        Limits("spectral density", frequency, density, lambda t: t.psd(frequency)),
-        Limits("first integral", time, first, lambda t: t.growth_from_known(time)[0]),
-        Limits("second integral", time, second, lambda t: t.growth_from_known(time)[1]),
+        Limits(tau, limit, lambda t: t.sampled_allan_variance(n, 1.0 / rate)),
+        Limits(frequency, density, lambda t: t.psd(frequency)),
+        Limits(time, first, lambda t: t.growth_from_known(time)[0]),
+        Limits(time, second, lambda t: t.growth_from_known(time)[1]),
     ]

@@ -4,22 +4,29 @@ A program is declared once. Its writer computes and writes the numbers by this d
 page "Which numbers go into which filter" lists them.
 """
 
+import json
 import math
+import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from imubench_pipeline.extensions.exports.comments import describe_model, format_comments
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.exports.imu import AXES, AxisNoise, ExportError, Imu, split_axes
 from imubench_pipeline.extensions.exports.mapping import (
     Mapped,
-    as_process,
-    as_walk,
+    describe_terms,
     find_common_time,
+    map_to_family,
 )
 from imubench_pipeline.extensions.exports.overbound import Family
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
+from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.units import convert
+from imubench_pipeline.words.numbers import number_text
+
+_LINE_WIDTH = 96  # of comments
 
 _UNITS = {"gyro": {"x": "rad/s", "dx": "rad/s^2"}, "accel": {"x": "m/s^2", "dx": "m/s^3"}}
 """SI units of a reading and of its rate of change."""
@@ -96,11 +103,19 @@ class Entry:
         return value if self.unit == self.si else float(convert(value, self.si, self.unit))
 
 
-@dataclass(frozen=True)
-class Program:
-    """A program, its convention, and the numbers in its file."""
+YAML = "{name}: {x}  # {about}"
+PYTHON_HEAD = "# -*- coding: utf-8 -*-\n{head}"
+"""Without the encoding (PEP 263), Python could take one from the comments, which contain names
+chosen by users."""
 
-    name: str
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    """A program that a noise model can be exported to, its convention, and the form of its file."""
+
+    name: str  # in commands and settings
+    title: str  # for people
+    file_name: str  # the usual name of its file
     family: Family  # terms that it supports; an overbound for it has these
     source: str  # address of the text that defines the numbers
     convention: str = ""  # words for the file, with {rate}
@@ -108,15 +123,28 @@ class Program:
     each: bool = False  # whether it takes a number of each axis
     positive: bool = False  # whether it takes no 0
     one_time: bool = False  # whether all processes have the same T_B
+    mark: str = "#"  # of comments
+    line: str = YAML  # template of a number (`format_entries`)
+    layout: str = "{head}{lines}"  # template of the file (`fill_layout`)
+    writer: Callable[[Imu], str | bytes] | None = None  # of a file that is more than its layout
+
+    def write(self, imu: Imu) -> str | bytes:
+        """Return the content of the file.
+
+        Raises ExportError if the program needs a quantity without estimate, or a density above 0.
+        """
+        return self.writer(imu) if self.writer else fill_layout(imu, self)
 
 
 def declare(
     name: str,
+    title: str,
+    file_name: str,
     source: str,
     convention: str,
     *rows: tuple[Any, ...],
     family: Family = "N+K",
-    **more: bool,
+    **more: Any,
 ) -> Program:
     """Return a program, from rows of a form and the names of the numbers of gyro and accelerometer.
 
@@ -129,7 +157,16 @@ def declare(
         for place, (quantity, own) in enumerate(names.items()):
             si = form.si.format(**_UNITS.get(quantity, {}))
             made.append(Entry(own, quantity, form, si, units[place] if units else si))
-    return Program(name, family, source, convention, made, **more)
+    return Program(
+        name=name,
+        title=title,
+        file_name=file_name,
+        family=family,
+        source=source,
+        convention=convention,
+        entries=made,
+        **more,
+    )
 
 
 def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
@@ -148,13 +185,10 @@ def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
 
     def map_axis(axis: AxisNoise) -> tuple[Mapped, list[str]]:
         """Return the model for the program, and the words against it."""
-        if program.family == "N+K":
-            one = as_walk(axis.model, imu.horizon, imu.rate)
-        else:
-            one = as_process(axis.model, imu.horizon, imu.rate, time=time)
+        one = map_to_family(axis.model, program.family, imu.horizon, imu.rate, time)
         zeros = [letter for letter in letters if not getattr(one.model, letter) > 0.0]
         return one, [
-            f"{letter} is 0, and {program.name} takes values above 0 only" for letter in zeros
+            f"{letter} is 0, and {program.title} takes values above 0 only" for letter in zeros
         ]
 
     mapped = {}
@@ -170,13 +204,82 @@ def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
 
 
 def describe(
-    imu: Imu, program: Program, mapped: Mapping[str, Mapped], *, temperature: bool = False
+    imu: Imu,
+    program: Program,
+    mapped: Mapping[str, Mapped] | None = None,
+    *,
+    temperature: bool = False,
 ) -> list[str]:
-    """Return the header of the file of a program (see `comments.describe_model`)."""
-    words = program.convention.format(rate=imu.rate)
-    return describe_model(
-        imu, program.name, words, mapped, temperature=temperature, each=program.each
-    )
+    """Return the header of the file of a program as printable statements.
+
+    `mapped`: the replacements of the models; `temperature`: the file contains the effect on the
+    biases.
+    """
+    statements = [f"Noise of {imu.sensor} for {program.title}, by imubench."]
+    if imu.simulated:
+        statements.append("The recordings are SIMULATED, not measured.")
+    if imu.mode:
+        statements.append(f"{imu.mode}.")
+    statements += [f"CAUTION: {caution}." for caution in imu.cautions]
+    statements.append(program.convention.format(rate=imu.rate))
+    units = {"gyro": "rad, s", "accel": "m, s"}
+    missing = [name for name in units if name not in imu.estimated]
+    statements += [f"{name}: not included, as there is no estimate." for name in missing]
+    described = split_axes(imu.estimated) if program.each else imu.estimated
+    for name, axis in described.items():
+        if name in units and any(f"{name} {letter}" in described for letter in AXES):
+            statements.append(f"{name}: the axes without an estimate have the following noise.")
+        statements.append(f"{name}: {axis.origin}.")
+        terms = describe_terms(axis.model.terms)
+        statements.append(f"{name} model ({units[name.split()[0]]}; N two-sided): {terms}.")
+        statements += [f"{name}: {note}." for note in axis.notes]
+    if temperature:
+        statements += [
+            f"{name} and temperature: {note}."
+            for name, effect in imu.temperature.items()
+            for note in effect.notes
+        ]
+        statements.append(
+            "Fixed biases are not included, as they change from one start to the next."
+        )
+    else:
+        statements.append(
+            "The file contains noise only. Fixed biases change from one start to the next, and "
+            "they and their dependence on temperature are not included."
+        )
+    if imu.inflation != 1.0:
+        statements.append(
+            f"INFLATED: all densities and amplitudes below are {number_text(imu.inflation)} times "
+            f"those above, because: {imu.because or ''}."
+        )
+    printed = [_join_lines(words) for words in statements]
+    replacements = (mapped or {}).items()
+    return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]
+
+
+def format_comments(statements: Sequence[str], mark: str = "#") -> str:
+    """Return statements as comment lines, each beginning with a mark.
+
+    Characters that are not safe in a comment of every format, such as a Unicode line separator in
+    the name of a recording, are escaped. Words longer than a line are divided.
+    """
+    lines = []
+    for statement in statements:
+        wrapped = textwrap.wrap(
+            _join_lines(statement), _LINE_WIDTH - len(mark) - 1, subsequent_indent="  "
+        )
+        lines += [f"{mark} {line}" for line in wrapped]
+    return "\n".join(lines) + "\n"
+
+
+def _join_lines(statement: str) -> str:
+    return escape_invisible(re.sub(r"[\t\n]", " ", statement))
+
+
+def format_decimal(value: float) -> str:
+    """Return a number without an exponent, and with a point."""
+    text = f"{value:.9f}".rstrip("0")
+    return text + "0" if text.endswith(".") else text
 
 
 def compute_values(entry: Entry, imu: Imu, mapped: Mapping[str, Mapped]) -> list[float]:
@@ -186,28 +289,44 @@ def compute_values(entry: Entry, imu: Imu, mapped: Mapping[str, Mapped]) -> list
     return [entry.compute(one.model, imu.rate, imu.horizon) for one in models]
 
 
-def format_entries(
-    program: Program, imu: Imu, mapped: Mapping[str, Mapped], line: str, of: str = ""
-) -> str:
-    """Return numbers by a template of a line; of one quantity if `of` names it.
+def format_entries(program: Program, imu: Imu, mapped: Mapping[str, Mapped], of: str = "") -> str:
+    """Return numbers by the template `Program.line`; of one quantity if `of` names it.
 
-    The template has ``{name}``, ``{x}`` or ``{xyz}`` for one number or three with commas, and
-    ``{about}`` for formula and unit.
+    The template has ``{name}``, ``{x}``, ``{y}`` and ``{z}`` for the number of an axis or ``{xyz}``
+    for three with commas, and ``{about}`` for formula and unit. A list in brackets becomes one
+    number if gyro and accelerometer share it.
     """
     text = ""
     for entry in program.entries:
         if of in ("", entry.quantity):
-            xyz = [f"{value:.6e}" for value in compute_values(entry, imu, mapped)]
+            x, y, z = (f"{value:.6e}" for value in compute_values(entry, imu, mapped))
+            line = program.line
+            if entry.quantity == "both":
+                line = line.replace("[{xyz}]", "{x}")
             about = f"{entry.form.formula}, {entry.unit}"
-            text += line.format(name=entry.name, x=xyz[0], xyz=", ".join(xyz), about=about) + "\n"
+            text += line.format(name=entry.name, x=x, y=y, z=z, xyz=f"{x}, {y}, {z}", about=about)
+            text += "\n"
     return text
 
 
-YAML = "{name}: {x}  # {about}"  # template of `format_entries`
+def fill_layout(
+    imu: Imu, program: Program, remark: Callable[[Mapping[str, Mapped]], list[str]] | None = None
+) -> str:
+    """Return a file by its template `Program.layout`; `remark` adds to its header.
 
-
-def compose(imu: Imu, program: Program, line: str, mark: str = "#") -> tuple[str, str]:
-    """Return the header of a file as comments, and its numbers by `format_entries`."""
+    The template has ``{head}``, the header as comments; ``{lines}``, or ``{gyro}``, ``{accel}`` and
+    ``{both}`` for the numbers; ``{rate}`` and ``{gravity}`` without an exponent; ``{topic}`` in
+    quotes; and ``{imu}`` for its other values.
+    """
     mapped = map_models(imu, program)
-    head = format_comments(describe(imu, program, mapped), mark)
-    return head, format_entries(program, imu, mapped, line)
+    about = describe(imu, program, mapped) + (remark(mapped) if remark else [])
+    numbers = {of: format_entries(program, imu, mapped, of) for of in ("gyro", "accel", "both")}
+    return program.layout.format(
+        head=format_comments(about, program.mark),
+        lines=format_entries(program, imu, mapped),
+        **numbers,
+        imu=imu,
+        rate=format_decimal(imu.rate),
+        gravity=format_decimal(STANDARD_GRAVITY),
+        topic=json.dumps(imu.ros_topic),
+    )

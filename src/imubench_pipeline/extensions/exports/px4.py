@@ -26,25 +26,13 @@ Format"; ArduPilot/pymavlink, mavparm.py (``load``).
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 from imubench_pipeline.extensions.exports import programs
-from imubench_pipeline.extensions.exports.comments import format_comments
-from imubench_pipeline.extensions.exports.imu import AXES, ExportError, Imu
+from imubench_pipeline.extensions.exports.imu import AXES, Imu
 from imubench_pipeline.extensions.exports.mapping import Mapped
 
-PX4 = programs.declare(
-    "PX4 (EKF2)",
-    "https://github.com/PX4/PX4-Autopilot/blob/HEAD/src/modules/ekf2/EKF/covariance.cpp",
-    "Noise per step of the filter: N / sqrt(dt) and K / sqrt(dt), where dt is EKF2_PREDICT_US; N "
-    "and K are two-sided densities, SI. The values are valid for the EKF2_PREDICT_US of the file "
-    "only. Vibration in flight adds to the noise at rest, and the defaults of PX4 allow for it.",
-    (programs.FILTER_SAMPLE, "EKF2_GYR_NOISE", "EKF2_ACC_NOISE"),
-    (programs.FILTER_STEP, "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),
-)
-
-DEFAULT_PERIOD = 10_000  # default of EKF2_PREDICT_US, us
-
-_PERIOD_RANGE = (1_000, 20_000)
+_PERIOD = 10_000  # default of EKF2_PREDICT_US, us
 _PARAMETER_RANGES = {
     "EKF2_ACC_NOISE": (0.01, 1.0),
     "EKF2_GYR_NOISE": (1e-4, 0.1),
@@ -56,21 +44,14 @@ _TEMPERATURE_PREFIXES = {"gyro": ("G", "GYRO"), "accel": ("A", "ACC")}
 """Letter after ``TC_``, and word after ``CAL_``."""
 
 
-def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
-    """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
-
-    Raises ExportError if gyro or accelerometer has no estimate, or the period is outside its range.
-    """
-    if not _PERIOD_RANGE[0] <= period <= _PERIOD_RANGE[1]:
-        raise ExportError(
-            f"EKF2_PREDICT_US is {period}, expected {_PERIOD_RANGE[0]} to {_PERIOD_RANGE[1]}"
-        )
+def write(imu: Imu) -> str:
+    """Return a parameter file; ExportError if gyro or accelerometer has no estimate."""
     mapped = programs.map_models(imu, PX4)
     about = programs.describe(imu, PX4, mapped, temperature=True)
-    values, remarks = clip_values(PX4, _PARAMETER_RANGES, mapped, period * 1e-6)
+    values, remarks = clip_values(PX4, _PARAMETER_RANGES, mapped, 1e-6 * _PERIOD)
     about += remarks
     rows = [f"1\t1\t{name}\t{value:.9g}\t{_REAL32_TYPE}\n" for name, value in values.items()]
-    rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")
+    rows.append(f"1\t1\tEKF2_PREDICT_US\t{_PERIOD}\t{_INT32_TYPE}\n")
     for quantity, effect in imu.temperature.items():
         if not effect.slope:
             continue
@@ -92,13 +73,34 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
             f"TC_{letter}_ENABLE is 1. The noise above includes the effect of "
             "temperature; --method compensated leaves it out."
         )
-    columns = "# Vehicle-Id Component-Id Name Value Type\n"
-    return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
+    head = programs.format_comments(["Onboard parameters for Vehicle 1", *about])
+    return head + "# Vehicle-Id Component-Id Name Value Type\n" + "".join(rows)
 
 
-def write_mavparm(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
+def write_mavparm(imu: Imu) -> str:
     """Return the parameters of `write` as lines ``NAME,value``, which pymavlink loads."""
-    return re.sub(r"(?m)^1\t1\t(\S+)\t(\S+)\t\d+$", r"\1,\2", write(imu, period))
+    return re.sub(r"(?m)^1\t1\t(\S+)\t(\S+)\t\d+$", r"\1,\2", write(imu))
+
+
+PX4 = programs.declare(
+    "px4",
+    "PX4 (EKF2)",
+    "ekf2.params",
+    "https://github.com/PX4/PX4-Autopilot/blob/HEAD/src/modules/ekf2/EKF/covariance.cpp",
+    "Noise per step of the filter: N / sqrt(dt) and K / sqrt(dt), where dt is EKF2_PREDICT_US; N "
+    "and K are two-sided densities, SI. The values are valid for the EKF2_PREDICT_US of the file "
+    "only. Vibration in flight adds to the noise at rest, and the defaults of PX4 allow for it.",
+    (programs.FILTER_SAMPLE, "EKF2_GYR_NOISE", "EKF2_ACC_NOISE"),
+    (programs.FILTER_STEP, "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),
+    writer=write,
+)
+MAVPARM = replace(
+    PX4,
+    name="px4-mavparm",
+    title="PX4 (EKF2), for pymavlink",
+    file_name="ekf2.parm",
+    writer=write_mavparm,
+)
 
 
 def clip_values(

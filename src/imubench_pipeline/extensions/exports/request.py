@@ -9,7 +9,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.extensions.exports import imu
 from imubench_pipeline.extensions.exports import reasons as texts
@@ -53,7 +52,6 @@ class Request:
     most_excess: float = MAX_EXCESS
     """Max. ratio of the Allan deviation of an overbound to its limit; a larger one is refused."""
     method: str | None = None  # of estimation; None: the recommended one
-    latitude: float | None = None  # for gravity, degrees; None: standard gravity
     rate: float | None = None  # of the program's samples, Hz; None: the rate of the recording
     ros_topic: str | None = None  # of the samples
     one_device: bool = False  # all recordings are of one device, and are pooled
@@ -124,11 +122,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
         every = (choice, *choice.each.values())
         if mode == "bounded":
-            curves = (_find_curve(tables, request.sensor, one) for one in every)
-            chosen, *own = (
-                _bound_axis(curve, one, request, about.rate, folder)
-                for curve, one in zip(curves, every, strict=True)
-            )
+            chosen, *own = (_bound_axis(tables, request, one, about.rate, folder) for one in every)
             largest = {
                 name: max(getattr(one.model, name) for one in (chosen, *own)) for name in "NK"
             }  # one number for all axes is above each of them
@@ -141,15 +135,11 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         raise imu.ExportError(
             f"{request.sensor}: no estimate; its recordings are left out: {reasons}"
         )
-    latitude = request.latitude
-    gravity = STANDARD_GRAVITY if latitude is None else imu.compute_normal_gravity(latitude)
     built = imu.Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
-        gyro=axes.get("gyro"),
-        accel=axes.get("accel"),
+        estimated=axes,
         horizon=request.horizon,
-        gravity=gravity,
         inflation=request.inflation,
         because=request.because,
         simulated=simulated,
@@ -211,7 +201,7 @@ def _limit_walk(axis: imu.AxisNoise, curve: AllanCurve, horizon: float) -> imu.A
 
 
 def _bound_axis(
-    curve: AllanCurve, choice: Choice, request: Request, rate: float, folder: Path | None
+    tables: Tables, request: Request, choice: Choice, rate: float, folder: Path | None
 ) -> imu.AxisNoise:
     """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
@@ -222,7 +212,7 @@ def _bound_axis(
             drawn = read_draws(path).get((choice.channel, choice.method))
     try:
         bound = overbound(
-            curve,
+            _find_curve(tables, request.sensor, choice),
             choice.axis.model,
             rate,
             family=family,
@@ -239,7 +229,7 @@ def _bound_axis(
             "larger excess"
         ) from error
     fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
-    notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
+    notes = [*bound.words, fitted, *choice.axis.notes]
     if bound.warning:
         notes.insert(0, f"WARNING: {'; '.join([bound.warning, *_list_larger_programs(family)])}")
     return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from imubench_pipeline.extensions.exports import comments, programs
+from imubench_pipeline.extensions.exports import programs
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.extensions.exports.imu import (
     AXES,
@@ -20,18 +20,6 @@ from imubench_pipeline.words.numbers import number_text
 
 _MIN_SAMPLES_IN_T_B = 20.0
 """With fewer samples in T_B, the program's discretisation is off by more than 3 %."""
-
-GNSS_INS_SIM = programs.declare(
-    "gnss-ins-sim",
-    "https://github.com/Aceinna/gnss-ins-sim/blob/HEAD/gnss_ins_sim/pathgen/pathgen.py",
-    "*_arw and *_vrw are N (two-sided) per root hour; *_b_stability is the standard deviation of a "
-    "first-order Gauss-Markov process (1.076 B), *_b_corr its T_B in s. Fixed biases are 0.",
-    (programs.WHITE, "gyro_arw", "accel_vrw", "deg/sqrt(h)", "m/s/sqrt(h)"),
-    (programs.PROCESS, "gyro_b_stability", "accel_b_stability", "deg/h", "m/s^2"),
-    (programs.TIME, "gyro_b_corr", "accel_b_corr"),
-    each=True,
-    family="N+GM",
-)
 
 
 def write_gnss_ins_sim(imu: Imu) -> str:
@@ -50,22 +38,37 @@ def write_gnss_ins_sim(imu: Imu) -> str:
     Source: Aceinna/gnss-ins-sim, gnss_ins_sim/sim/imu_model.py (names and units),
     gnss_ins_sim/pathgen/pathgen.py (acc_gen, gyro_gen, bias_drift).
     """
-    mapped = programs.map_models(imu, GNSS_INS_SIM)
-    about = programs.describe(imu, GNSS_INS_SIM, mapped)
-    for name, process in mapped.items():
-        if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
-            about.append(
-                f"{name}: T_B is {number_text(process.model.T_B * imu.rate, 3)} samples, and the "
-                "discretisation of the program is inaccurate for so short a process."
-            )
-    lines = programs.format_entries(
-        GNSS_INS_SIM, imu, mapped, '    "{name}": np.array([{xyz}]),  # {about}'
-    )
-    text = "import numpy as np\n\nimu_err = {\n" + lines
-    text += '    "gyro_b": np.zeros(3),  # deg/h, fixed bias\n'
-    text += '    "accel_b": np.zeros(3),  # m/s^2, fixed bias\n}\n'
-    return comments.format_python_comments(about) + text
 
+    def warn_of_short_processes(mapped: Mapping[str, Mapped]) -> list[str]:
+        samples = {name: imu.rate * (one.model.T_B or math.inf) for name, one in mapped.items()}
+        return [
+            f"{name}: T_B is {number_text(number, 3)} samples, and the discretisation of the "
+            "program is inaccurate for so short a process."
+            for name, number in samples.items()
+            if number < _MIN_SAMPLES_IN_T_B
+        ]
+
+    return programs.fill_layout(imu, GNSS_INS_SIM, warn_of_short_processes)
+
+
+GNSS_INS_SIM = programs.declare(
+    "gnss-ins-sim",
+    "gnss-ins-sim",
+    "imu_err.py",
+    "https://github.com/Aceinna/gnss-ins-sim/blob/HEAD/gnss_ins_sim/pathgen/pathgen.py",
+    "*_arw and *_vrw are N (two-sided) per root hour; *_b_stability is the standard deviation of a "
+    "first-order Gauss-Markov process (1.076 B), *_b_corr its T_B in s. Fixed biases are 0.",
+    (programs.WHITE, "gyro_arw", "accel_vrw", "deg/sqrt(h)", "m/s/sqrt(h)"),
+    (programs.PROCESS, "gyro_b_stability", "accel_b_stability", "deg/h", "m/s^2"),
+    (programs.TIME, "gyro_b_corr", "accel_b_corr"),
+    each=True,
+    family="N+GM",
+    line='    "{name}": np.array([{xyz}]),  # {about}',
+    layout=programs.PYTHON_HEAD + "import numpy as np\n\nimu_err = {{\n{lines}"
+    '    "gyro_b": np.zeros(3),  # deg/h, fixed bias\n'
+    '    "accel_b": np.zeros(3),  # m/s^2, fixed bias\n}}\n',
+    writer=write_gnss_ins_sim,
+)
 
 _MAX_POLES = 2000
 _REFERENCE_TEMPERATURE = 25.0  # temperature at which TemperatureBias adds nothing, degC
@@ -86,18 +89,6 @@ _FILTER_DRIVE = programs.Form(
     "{x}",
     "per sample, standard deviation; p = exp(-1 / (rate T_B)); B, of flicker noise",
     _compute_drive,
-)
-MATLAB = programs.declare(
-    "MATLAB (imuSensor)",
-    "https://www.mathworks.com/help/nav/ref/imusensor-system-object.html",
-    "NoiseDensity is N and RandomWalk is K in the two-sided convention, which this program calls "
-    "single-sided; BiasInstability drives the filter of BiasInstabilityCoefficients, made for "
-    "SampleRate = {rate:g} Hz, the same of all three axes. R2023b or newer.",
-    (programs.WHITE, "NoiseDensity", "NoiseDensity"),
-    (programs.WALK, "RandomWalk", "RandomWalk"),
-    (_FILTER_DRIVE, "BiasInstability", "BiasInstability"),
-    each=True,
-    family="N+GM+K",
 )
 
 
@@ -133,7 +124,7 @@ def write_matlab(imu: Imu) -> str:
     about = programs.describe(imu, MATLAB, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in coefficients}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
-    text = comments.format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
+    text = programs.format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     members = {"gyro": ("Gyroscope", "gyroparams"), "accel": ("Accelerometer", "accelparams")}
     for name, of_filter in coefficients.items():
@@ -141,8 +132,7 @@ def write_matlab(imu: Imu) -> str:
         rows = [(key, f"[{value}]", words) for key, value, words in biases[name][0]]
         text += f"IMU.{member} = {maker}( ...\n"
         text += "    'NoiseType', 'single-sided', ...  % two-sided density, see above\n"
-        line = "    '{name}', [{xyz}], ...  % {about}"
-        text += programs.format_entries(MATLAB, imu, mapped, line, name)
+        text += programs.format_entries(MATLAB, imu, mapped, name)
         text += "".join(f"    {key}, {value}, ...  % {words}\n" for key, value, words in rows)
         text += f"    'BiasInstabilityCoefficients', {of_filter});  % of the filter\n"
     effects = [imu.temperature[name] for name in biases if biases[name][0]]
@@ -153,6 +143,24 @@ def write_matlab(imu: Imu) -> str:
             f"{high:.9g} the biases follow it\n"
         )
     return text
+
+
+MATLAB = programs.declare(
+    "matlab",
+    "MATLAB (imuSensor)",
+    "imu_noise.m",
+    "https://www.mathworks.com/help/nav/ref/imusensor-system-object.html",
+    "NoiseDensity is N and RandomWalk is K in the two-sided convention, which this program calls "
+    "single-sided; BiasInstability drives the filter of BiasInstabilityCoefficients, made for "
+    "SampleRate = {rate:g} Hz, the same of all three axes. R2023b or newer.",
+    (programs.WHITE, "NoiseDensity", "NoiseDensity"),
+    (programs.WALK, "RandomWalk", "RandomWalk"),
+    (_FILTER_DRIVE, "BiasInstability", "BiasInstability"),
+    each=True,
+    family="N+GM+K",
+    line="    '{name}', [{xyz}], ...  % {about}",
+    writer=write_matlab,
+)
 
 
 def _map_temperature(
@@ -205,21 +213,6 @@ def _format_numbers(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
 
 
-GAZEBO = programs.declare(
-    "Gazebo (SDF)",
-    "https://github.com/gazebosim/gz-sensors/blob/HEAD/src/GaussianNoiseModel.cc",
-    "stddev is N sqrt(rate), a sample, for update_rate = {rate:g} Hz only. dynamic_bias_stddev is "
-    "the root of the two-sided density that drives a Gauss-Markov process, continuous in time, and "
-    "bias_stddev its stationary standard deviation. SI.",
-    (programs.SAMPLE, "stddev", "stddev"),
-    (programs.PROCESS, "bias_stddev", "bias_stddev"),
-    (programs.DRIVE, "dynamic_bias_stddev", "dynamic_bias_stddev"),
-    (programs.TIME, "dynamic_bias_correlation_time", "dynamic_bias_correlation_time"),
-    each=True,
-    family="N+GM",
-)
-
-
 def write_gazebo(imu: Imu) -> str:
     """Return SDF with a sensor ``imu`` in a model; copy the sensor into your own model.
 
@@ -247,9 +240,26 @@ def write_gazebo(imu: Imu) -> str:
             noise += f"              </noise>\n            </{axis}>\n"
         noise += f"          </{element}>\n"
     # Two hyphens would end a comment of XML.
-    words = re.sub("-(?=-)", "- ", comments.format_comments(about))
-    return _SDF.format(about=words, rate=comments.format_decimal(imu.rate), noise=noise)
+    words = re.sub("-(?=-)", "- ", programs.format_comments(about))
+    return _SDF.format(about=words, rate=programs.format_decimal(imu.rate), noise=noise)
 
+
+GAZEBO = programs.declare(
+    "gazebo",
+    "Gazebo (SDF)",
+    "imu.sdf",
+    "https://github.com/gazebosim/gz-sensors/blob/HEAD/src/GaussianNoiseModel.cc",
+    "stddev is N sqrt(rate), a sample, for update_rate = {rate:g} Hz only. dynamic_bias_stddev is "
+    "the root of the two-sided density that drives a Gauss-Markov process, continuous in time, and "
+    "bias_stddev its stationary standard deviation. SI.",
+    (programs.SAMPLE, "stddev", "stddev"),
+    (programs.PROCESS, "bias_stddev", "bias_stddev"),
+    (programs.DRIVE, "dynamic_bias_stddev", "dynamic_bias_stddev"),
+    (programs.TIME, "dynamic_bias_correlation_time", "dynamic_bias_correlation_time"),
+    each=True,
+    family="N+GM",
+    writer=write_gazebo,
+)
 
 _SDF = """\
 <?xml version="1.0" encoding="UTF-8"?>

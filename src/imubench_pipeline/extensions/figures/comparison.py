@@ -1,7 +1,7 @@
 """One channel of all sensors: the curves, and the parameters with their intervals."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -150,28 +150,17 @@ class Mark:
     upper: float | None = None
 
 
-def make_marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
-    """Yield a mark for each component of a parameter, within ``spread`` about the place."""
-    if view.recommended not in view.parameters:
-        return
-    rows = view.named(view.recommended, symbol)
-    rows = [row for row in rows if row.value is not None or row.upper]
-    for number, row in enumerate(rows):
-        at = place + spread * ((number + 0.5) / len(rows) - 0.5)
-        lower, upper = row.lower, row.upper
-        if lower is not None and lower < 0.0:
-            # A ramp has a sign, and a logarithmic axis shows its size.
-            if upper is None:
-                lower = None
-            else:
-                lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
+def make_mark(view: ChannelView, symbol: str, place: float) -> Mark | None:
+    """Return the mark of one of the compared parameters at a place, if it has a value or limit."""
+    rows = view.named(view.recommended, symbol) if view.recommended in view.parameters else []
+    for row in rows:
         if row.value is not None:
-            yield Mark(at, "estimate", abs(row.value), lower, upper)
-        elif not lower:
-            yield Mark(at, "limit", upper)
-        else:
-            fitted = None if row.fitted is None else abs(row.fitted)
-            yield Mark(at, "not identified", fitted, lower, upper)
+            return Mark(place, "estimate", row.value, row.lower, row.upper)
+        if row.upper:
+            kind: Kind = "not identified" if row.lower else "limit"
+            value = row.fitted if row.lower else row.upper
+            return Mark(place, kind, value, row.lower, row.upper if row.lower else None)
+    return None
 
 
 @dataclass(frozen=True)
@@ -194,10 +183,8 @@ def draw_forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
     system: System = "practical",
-    symbol: str | Sequence[str] = COMPARED,
 ) -> Figure:
     """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
-    symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = assign_sensor_styles(list(sensors))
     # The height of the row of a sensor grows with its recordings, up to a page in all.
     by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
@@ -217,15 +204,12 @@ def draw_forest_figure(
     total = blocks[-1].bottom
     name = style.name_channel(views[0].channel)
     figure = style.make_figure(
-        style.SINGLE if len(symbols) == 1 else style.DOUBLE,
-        total + _FRAME_HEIGHT,
-        f"{name}: {', '.join(symbols)} of all sensors",
+        style.DOUBLE, total + _FRAME_HEIGHT, f"{name}: {', '.join(COMPARED)} of all sensors"
     )
-    panels = figure.subplots(1, len(symbols), sharey=True, squeeze=False)[0]
+    panels = figure.subplots(1, len(COMPARED), sharey=True)
     kinds: set[str] = set()
-    for panel, each in zip(panels, symbols, strict=True):
-        ticks = 7 if len(symbols) == 1 else 4
-        kinds |= _draw_panel(panel, blocks, looks, each, system, ticks=ticks)
+    for panel, symbol in zip(panels, COMPARED, strict=True):
+        kinds |= _draw_panel(panel, blocks, looks, symbol, system)
     first = panels[0]
     first.set_ylim(total, 0.0)
     first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
@@ -252,8 +236,6 @@ def _draw_panel(
     looks: dict[str, Appearance],
     symbol: str,
     system: System,
-    *,
-    ticks: int,
 ) -> set[str]:
     """Draw one parameter of all sensors; return the kinds of marks that occur."""
     unit = choose_page_unit(blocks[0].views[0].quantity, symbol, system)
@@ -263,11 +245,11 @@ def _draw_panel(
         if number % 2:
             axes.axhspan(block.top, block.bottom, color="0.955", lw=0, zorder=0.0)
         step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT_HEIGHT
-        of_block = [
-            mark
+        marks = (
+            make_mark(view, symbol, place)
             for view, place in zip(block.views, block.places, strict=True)
-            for mark in make_marks(view, symbol, place, 0.8 * step)
-        ]
+        )
+        of_block = [mark for mark in marks if mark is not None]
         truths += [
             (place, view.truth[symbol].value * unit.per_si)
             for view, place in zip(block.views, block.places, strict=True)
@@ -294,14 +276,12 @@ def _draw_panel(
     places, values = zip(*truths, strict=True) if truths else ((), ())
     if truths:
         axes.plot(values, places, marker="|", ms=6.0, mew=0.8, ls="none", color="black", zorder=3.5)
-    _set_limits(axes, drawn, values, unit.per_si, ticks)
+    _set_limits(axes, drawn, values, unit.per_si)
     axes.set_xlabel(f"{style.SYMBOLS[symbol]} ({unit.sign})")
     return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
 
 
-def _set_limits(
-    axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
-) -> None:
+def _set_limits(axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float) -> None:
     """Set axis limits for all values and, within bounds, their intervals."""
     values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
     # The arrow of a limit needs room at its left.
@@ -313,7 +293,7 @@ def _set_limits(
         return
     reach = 10.0**_MAX_INTERVAL_DECADES
     near = np.clip(ends, min(values) / reach, max(values) * reach)
-    style.set_log_axis(axes, "x", style.compute_limits(values, near, margin=1.6), ticks=ticks)
+    style.set_log_axis(axes, "x", style.compute_limits(values, near, margin=1.6), ticks=4)
 
 
 def _draw_marks(

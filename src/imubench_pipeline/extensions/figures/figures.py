@@ -2,7 +2,6 @@
 
 import base64
 import io
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -33,13 +32,6 @@ CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
     "spectrum": curves.draw_spectrum_figure,
 }
 """Figures of one channel of one recording; None where there is nothing to show."""
-
-_COORDINATE_PATTERN = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
-_DECIMALS_PATTERN = re.compile(rb"(\.\d\d)\d+")
-_MARKS_PATTERN = re.compile(
-    rb'(<g clip-path="[^"]*")>(\s*<use [^>]*?style="([^"]*)"/>(?:\s*<use [^>]*?style="\3"/>)+)'
-)
-_LEADING_SPACE_PATTERN = re.compile(rb"\n\s+")
 
 
 def list_cross_figures(
@@ -122,15 +114,4 @@ def _write_bytes(figure: Figure, kind: str) -> bytes:
     buffer = io.BytesIO()
     with set_style():
         figure.savefig(buffer, format=kind, metadata=metadata)
-    data = buffer.getvalue()
-    if kind != "svg":
-        return data
-
-    def move_style_to_group(match: re.Match[bytes]) -> bytes:
-        group, marks, looks = match.groups()
-        attribute = b' style="' + looks + b'"'
-        return group + attribute + b">" + marks.replace(attribute, b"")
-
-    # Half the size: coordinates to a hundredth of a point, a style once for all of its marks.
-    data = _COORDINATE_PATTERN.sub(lambda match: _DECIMALS_PATTERN.sub(rb"\1", match[0]), data)
-    return _LEADING_SPACE_PATTERN.sub(b"\n", _MARKS_PATTERN.sub(move_style_to_group, data))
+    return buffer.getvalue()

@@ -38,10 +38,6 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Newer releases of Matplotlib have a type of their own for the names of settings.
 _STYLE_SETTINGS: Any = {
-    # Matplotlib brings this font, so a figure has the same layout on every machine.
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "mathtext.fontset": "dejavusans",
     "font.size": FONT_SIZE,
     "axes.labelsize": FONT_SIZE + 0.5,
     "axes.titlesize": _TITLE_SIZE,

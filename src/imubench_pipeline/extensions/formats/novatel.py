@@ -9,7 +9,6 @@ channel is the scale factor of the IMU times the rate of the log in Hz. The time
 
 import re
 import zlib
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.extensions.formats.vectornav import parse_fields
+from imubench_pipeline.extensions.formats.vectornav import Counts, parse_fields
 from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.stamps import Clock
@@ -80,14 +79,13 @@ def compute_crc(text: bytes) -> int:
     return zlib.crc32(text, _CRC_START) ^ _CRC_START
 
 
-class _Logs:
+class _Logs(Counts):
     """Extracts the logs of one kind, that of the first, and counts the other text."""
 
     def __init__(self, *, stamped: bool) -> None:
+        super().__init__()
         self.kind, self._stamped = b"", stamped
         self.checked: bool | None = None  # whether a checksum in the first block is right
-        self.right = self.wrong = self.unread = self.garbage = 0
-        self.others: Counter[str] = Counter()
         self.imu = ""  # type of the IMU, if the logs state it
 
     def parse(
@@ -154,19 +152,10 @@ class NovatelFile(LogFile):
                 self.findings.append(zeros)
         if not logs.right:
             raise _make_empty_error(self.path)
-        file, kind = self.path.name, logs.kind.decode()
-        if count := logs.wrong:
-            timed = time is not None
-            wrong = files.WrongChecksum(file, count, kind, is_sentence=True, is_left_out=timed)
-            self.note(wrong, count)
+        kind = logs.kind.decode()
+        logs.report(self, kind, _WIDTH)
         if not logs.checked:
-            self.note(files.UncheckedLogs(file, logs.right, kind), logs.right)
-        if count := logs.unread:
-            self.note(files.UnreadableSentence(file, count, kind, _WIDTH), count)
-        if count := logs.others.total():
-            self.note(files.OtherSentences(file, count, tuple(sorted(logs.others))), count, "note")
-        if count := logs.garbage:
-            self.note(files.NotSentences(file, count), count, "note")
+            self.note(files.UncheckedLogs(self.path.name, logs.right, kind), logs.right)
 
 
 def list_logs(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:

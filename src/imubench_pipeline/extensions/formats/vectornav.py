@@ -84,15 +84,35 @@ _SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")  # after a `$`; shorter text has
 _MAX_OTHER_NAMES, _MAX_SENTENCE_NAME = 1000, 32  # of other sentences; letters of one
 
 
-class Sentences:
+class Counts:
+    """Numbers of sentences by their state, and of other text."""
+
+    def __init__(self) -> None:
+        self.right = self.wrong = self.unread = self.garbage = 0
+        self.others: Counter[str] = Counter()
+
+    def report(self, file: LogFile, kind: str, width: int) -> None:
+        """Note in the findings of a log what is no sentence of a kind and width."""
+        name, timed = file.path.name, file.log.time is not None
+        if count := self.wrong:
+            wrong = files.WrongChecksum(name, count, kind, is_sentence=True, is_left_out=timed)
+            file.note(wrong, count)
+        if count := self.unread:
+            file.note(files.UnreadableSentence(name, count, kind, width), count)
+        if count := self.others.total():
+            file.note(files.OtherSentences(name, count, _shorten_names(self.others)), count, "note")
+        if count := self.garbage:
+            file.note(files.NotSentences(name, count), count, "note")
+
+
+class Sentences(Counts):
     """Extracts the sentences of one kind, and counts the other text."""
 
     def __init__(self, kind: str, stamped: bool) -> None:
+        super().__init__()
         self._head = kind.encode() + b","
         self._commas = len(FIELDS[kind])
         self._stamped = stamped
-        self.right = self.wrong = self.unread = self.garbage = 0
-        self.others: Counter[str] = Counter()
 
     def add(self, text: bytes) -> list[Row]:
         """Return the records in some lines; a record with an empty body is a missing sample."""
@@ -281,7 +301,13 @@ class VectorNavFile(LogFile):
                 name: self.to_si(name, fields[position]) for name, position in positions.items()
             }
             yield Batch(time, columns)
-        self._report(kind, records)
+        if not records.right:
+            raise RecordingError(
+                f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
+                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
+                "sensor file right, and the checksum on (register 30)?"
+            )
+        records.report(self, f"${kind}", len(FIELDS[kind]))
 
     def _kind(self) -> str:
         """Return the kind of sentence with the columns."""
@@ -350,27 +376,6 @@ class VectorNavFile(LogFile):
         stamp = first.item()
         scale = SECONDS[time.unit or "ns"] * 1e9
         return format_date(stamp if isinstance(stamp, int) else round(stamp * scale))
-
-    def _report(self, kind: str, records: Sentences) -> None:
-        if not records.right:
-            raise RecordingError(
-                f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
-                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
-                "sensor file right, and the checksum on (register 30)?"
-            )
-        file, timed = self.path.name, self.log.time is not None
-        if count := records.wrong:
-            wrong = files.WrongChecksum(
-                file, count, f"${kind}", is_sentence=True, is_left_out=timed
-            )
-            self.note(wrong, count)
-        if count := records.unread:
-            self.note(files.UnreadableSentence(file, count, f"${kind}", len(FIELDS[kind])), count)
-        if count := records.others.total():
-            names = _shorten_names(records.others)
-            self.note(files.OtherSentences(file, count, names), count, "note")
-        if count := records.garbage:
-            self.note(files.NotSentences(file, count), count, "note")
 
 
 def _shorten_names(names: Iterable[str]) -> tuple[str, ...]:

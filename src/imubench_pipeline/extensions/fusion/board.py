@@ -3,10 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -25,7 +24,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Parts:
-    """Variances of the sensors of a board at several frequencies or tau.
+    """Variances of the sensors of a board at several tau.
 
     The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. The parts are
     stored separately, since the sum loses precision if the shared part is far the largest.
@@ -35,20 +34,18 @@ class Parts:
     shared: Array  # shape (m, s); shared processes, in their squared units
     sensitivities: Array  # shape (s, n); g: SI per these units
 
-    def of_sum(self, weights: NDArray[Any]) -> Array:
-        """Return the independent and shared variances of sums, weighted (m, n): SI^2, (m, 2)."""
-        alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
-        common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
-        return np.column_stack((alone, common))
+    def of_sum(self, weights: Array) -> tuple[Array, Array]:
+        """Return the independent and shared variances of a sum, SI^2, (m,), with weights (n,)."""
+        alone = np.sum(self.own * weights**2, axis=1)
+        return alone, np.sum(self.shared * (self.sensitivities @ weights) ** 2, axis=1)
 
 
 @dataclass(frozen=True)
 class Board:
     """Sensors that measure the same signal, all in SI; ValueError if they do not match.
 
-    The fused rate is the lowest. A faster sensor is decimated by block means: N and the Allan
-    variance do not change; the spectrum above the fused Nyquist frequency is aliased below it,
-    attenuated by |sin(m w/2) / (m sin(w/2))|^2.
+    The fused rate is the lowest. A faster sensor is decimated by block means, which change neither
+    N nor the Allan variance.
     """
 
     models: Sequence[NoiseModel]  # noise of each sensor, independent of the others
@@ -68,8 +65,7 @@ class Board:
             if abs(ratio - round(ratio)) > _RATIO_TOLERANCE * ratio:
                 raise ValueError(
                     f"a rate of {rate:g} Hz is not a whole multiple of the lowest, {self.rate:g} "
-                    "Hz; "
-                    "resample that sensor first"
+                    "Hz; resample that sensor first"
                 )
         for process in self.shared:
             sensitivity = np.asarray(process.sensitivity, dtype=np.float64)
@@ -117,21 +113,7 @@ class Board:
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
         common = [process.model.allan_variance(t, self.rate) for process in self.shared]
-        return self._make_parts(own, common, len(t))
-
-    def spectral_parts(self, omega: ArrayLike) -> Parts:
-        """Return the spectra without ramps and lines at omega, rad per sample, shape (m,)."""
-        w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have the same spectrum
-        keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]
-        for key, model, rate in zip(keys, self.models, self.rates, strict=True):
-            if key not in spectra:
-                spectra[key] = block_mean_spectrum(model, w, rate, key[1])
-        common = [process.model.sampled_spectrum(w, self.rate) for process in self.shared]
-        return self._make_parts([spectra[key] for key in keys], common, len(w))
-
-    def _make_parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
-        shared = np.array(common).reshape(len(self.shared), points)
+        shared = np.array(common).reshape(len(self.shared), len(t))
         return Parts(np.column_stack(own), shared.T, self.sensitivities)
 
 
@@ -161,24 +143,3 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
             )
         )
     return parts[0], parts[1]
-
-
-def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
-    """Return the spectrum of block means of ``size`` (m) samples, with all aliases, SI^2.
-
-    sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), with w ``omega``,
-    shape (m,), rad per block, above 0 and up to pi; the rate of the samples is in Hz.
-    """
-    if size == 1:
-        return model.sampled_spectrum(omega, rate)
-    total = np.zeros_like(omega)
-    for fold in range(size):
-        folded = (omega + 2.0 * np.pi * fold) / size
-        transfer = (np.sin(omega / 2.0) / np.sin(folded / 2.0)) ** 2 / size**3
-        total += transfer * model.sampled_spectrum(folded, rate)
-    return total
-
-
-def stochastic(model: NoiseModel) -> NoiseModel:
-    """Return a model without its ramp and lines, which have no spectral density."""
-    return replace(model, R=0.0, sinusoids=())

@@ -1,8 +1,7 @@
 """The table ``fusion`` of a run, from its tables of recordings and parameters."""
 
 import math
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
 
@@ -29,34 +28,29 @@ from imubench_pipeline.units import parse_quantity
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}  # of a printed figure
 
 
-@dataclass(frozen=True)
-class Grade:
-    """A sensor of the better class."""
-
-    sensor: str  # name in the catalogue
-    name: str  # vendor and model
-    datasheet: Datasheet
-
-    def printed(self, channel: str) -> Iterator[tuple[str | None, Comparable]]:
-        """Yield the printed N and floor, SI, of each option; without a value if not printed."""
-        sheet = getattr(self.datasheet, channel.split("_")[0])
-        if sheet is None:
-            return
-        names = ("noise_density", "random_walk", "bias_instability")
-        figures = [figure for name in names for figure in sheet.printed(name)]
-        options = dict.fromkeys(figure.option for figure in figures) or {None: None}
-        for option in options:
-            chosen = self.datasheet.model_copy(update={"options": [option] if option else []})
-            for one in read_comparables(chosen, channel):
-                of_option = one.figure is None or one.figure.option in (None, option)
-                if one.statistic in PARAMETER_OF_STATISTIC and of_option:
-                    yield option, one
+def _yield_printed(datasheet: Datasheet, channel: str) -> Iterator[tuple[str | None, Comparable]]:
+    """Yield the printed N and floor, SI, of each option; without a value if not printed."""
+    sheet = getattr(datasheet, channel.split("_")[0])
+    if sheet is None:
+        return
+    names = ("noise_density", "random_walk", "bias_instability")
+    figures = [figure for name in names for figure in sheet.printed(name)]
+    options = dict.fromkeys(figure.option for figure in figures) or {None: None}
+    for option in options:
+        chosen = datasheet.model_copy(update={"options": [option] if option else []})
+        for one in read_comparables(chosen, channel):
+            of_option = one.figure is None or one.figure.option in (None, option)
+            if one.statistic in PARAMETER_OF_STATISTIC and of_option:
+                yield option, one
 
 
 def yield_grade_rows(
-    candidates: Iterable[ComparedChannel], grades: Sequence[Grade]
+    candidates: Iterable[ComparedChannel], grades: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Yield the rows of ``grades``: the axis of median N of each sensor, each printed figure."""
+    """Yield the rows of ``grades``: the axis of median N of each sensor, each printed figure.
+
+    `grades`: the sensors of the better class, by their names in the catalogue.
+    """
     by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
     for channel in candidates:
         quantity = channel.channel.split("_")[0]
@@ -64,10 +58,10 @@ def yield_grade_rows(
     for (quantity, sensor), channels in sorted(by_sensor.items()):
         measured = [channel for channel in channels if not channel.simulated] or channels
         chosen = sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
-        for grade in grades:
-            if grade.sensor == sensor:
+        for grade, better in grades.items():
+            if grade == sensor:
                 continue
-            for option, printed in grade.printed(chosen.channel):
+            for option, printed in _yield_printed(better.datasheet, chosen.channel):
                 name = PARAMETER_OF_STATISTIC[printed.statistic]
                 estimate = chosen.estimate
                 of = estimate.parameters if name == "N" else estimate.curve or {}
@@ -81,8 +75,8 @@ def yield_grade_rows(
                     recording=chosen.recording,
                     channel=chosen.channel,
                     simulated=chosen.simulated,
-                    grade=grade.sensor,
-                    grade_name=grade.name,
+                    grade=grade,
+                    grade_name=f"{better.vendor} {better.model}",
                     option=option,
                     statistic=name,
                     value=own.value,
@@ -194,11 +188,7 @@ def yield_grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
     """Return the rows of the table ``grades``, including sensors not for sale, such as boards."""
-    grades = [
-        Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
-        for name, sensor in sensors.items()
-        if sensor.grade == "tactical"
-    ]
+    grades = {name: sensor for name, sensor in sensors.items() if sensor.grade == "tactical"}
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
     return yield_grade_rows(yield_candidates(tables, None, not_sold), grades)
 

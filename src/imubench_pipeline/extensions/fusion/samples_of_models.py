@@ -6,7 +6,7 @@ read from the curve, the model after it is the estimate. Both pass the estimated
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
@@ -38,7 +38,11 @@ def simulate_samples_of_models(
     logs = load_static_logs(folder)
     if not logs:
         return
-    filters = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
+    low_pass = {
+        row.channel: LowPass(row.value, row.order)
+        for row in LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
+        if row.parameter == "cutoff" and row.value is not None and row.order is not None
+    }
     thermal = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     by_method = {
         channel: {estimate.method: estimate.model for estimate in own}
@@ -46,18 +50,10 @@ def simulate_samples_of_models(
     }
     for channel, log in logs.items():
         key = Key(sensor, recording, channel)
-        cutoffs = (
-            LowPass(row.value, row.order)
-            for row in filters
-            if (row.channel, row.parameter) == (channel, "cutoff")
-            and row.value is not None
-            and row.order is not None
-        )
-        low_pass = next(cutoffs, None)
         followed = {row.parameter: row for row in thermal if row.channel == channel}
         samples = min(log.grid, MAX_SAMPLES)
         yield from _rows(key, "log", log.rate, samples, log.blocks())
-        plain = SensorModel(low_pass=low_pass, bias=log.mean())
+        plain = SensorModel(low_pass=low_pass.get(channel), bias=log.mean())
         models = by_method.get(channel, {})
         warm = bool(followed) and followed["sensitivity"].compensated
         after = models.get("compensated" if warm else "likelihood")
@@ -65,7 +61,7 @@ def simulate_samples_of_models(
             if noise is None:
                 continue
             noise = before_the_filter(plain, noise, log.rate)
-            model = SensorModel(noise=noise, low_pass=plain.low_pass, bias=plain.bias)
+            model = replace(plain, noise=noise)
             temperature = None
             if of == "after" and warm:
                 model, temperature = _warmed(model, followed, log)
@@ -87,8 +83,7 @@ def _warmed(
         quadratic=value["quadratic"] or 0.0,
         lag=value["lag"] or 0.0,
     )
-    bias = model.bias if bias is None else bias
-    warmed = SensorModel(noise=model.noise, low_pass=model.low_pass, bias=bias, drift=drift)
+    warmed = replace(model, bias=model.bias if bias is None else bias, drift=drift)
     readings = np.concatenate([*log.temperatures()])
     size = max(round(_TEMPERATURE_AVERAGING_TIME * log.rate), 1)
     at, means = [], []

@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from imubench_pipeline.extensions.fusion.board import Board
-from imubench_pipeline.extensions.fusion.samples import fuse
 from imubench_pipeline.extensions.fusion.settings import Specimens
-from imubench_pipeline.extensions.fusion.weights import Constant, best_constant
+from imubench_pipeline.extensions.fusion.weights import Constant, best_constant, fuse
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import TEMPERATURE

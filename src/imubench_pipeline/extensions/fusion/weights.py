@@ -1,48 +1,26 @@
-"""Weights of the sensors of a board in one virtual sensor; their sum is 1 at every frequency."""
+"""Constant weights of the sensors of a board in one virtual sensor, and its samples."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.extensions.fusion.board import Board, Parts
 from imubench_pipeline.typing import Array
 
+_BLOCK_LENGTH = 1 << 16  # of a product, in samples: its rounding depends on the number of rows
 _MIN_VARIANCE_RATIO = 1e-14  # of a sensor without noise, over the noisiest one
-
-
-class Weights(Protocol):
-    """Weights of the sensors of a board."""
-
-    def response(self, omega: Array) -> NDArray[Any]:
-        """Return the weights, (m, n), complex for a delay, at omega, rad per fused sample, (m,)."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """Weights that are the same at every frequency; ValueError if their sum is not 1."""
+    """Weights of sensors; ValueError if their sum is not 1."""
 
     values: Array  # shape (n,); their sum is 1, so that the common signal passes unchanged
 
     def __post_init__(self) -> None:
         if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:
             raise ValueError("expected a weight for each sensor, with a sum of 1")
-
-    def response(self, omega: Array) -> Array:
-        """Return the weights, shape (m, n), at every frequency the same (see `Weights`)."""
-        return np.broadcast_to(self.values, (len(omega), len(self.values)))
-
-
-@dataclass(frozen=True)
-class ByFrequency:
-    """Optimal weights at each frequency, S^-1 1 / (1^T S^-1 1), as of a non-causal smoother."""
-
-    board: Board  # with the models for the weights
-
-    def response(self, omega: Array) -> Array:
-        """Return the weights, shape (m, n), real: no delay (see `Weights`)."""
-        return least(self.board.spectral_parts(omega))
 
 
 def equal(sensors: int) -> Constant:
@@ -70,7 +48,7 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
 
 
 def least(parts: Parts) -> Array:
-    """Return the weights of least variance with a sum of 1, shape (m, n), at m frequencies or tau.
+    """Return the weights of least variance with a sum of 1, shape (m, n), at m tau.
 
     The model is y = 1 x + G c + e, with x unknown, and c the shared processes with unit variance.
     The normal equations are well conditioned if the mean of G is treated separately.
@@ -95,3 +73,27 @@ def least(parts: Parts) -> Array:
     lever = root * mean / np.sqrt(unit[:, 0])
     weights = rows[:, 0] - np.einsum("ks,ksn->kn", lever, rows[:, 1:])
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
+    """Return the samples of all sensors at the fused rate, shape (k, n): means of blocks.
+
+    The samples of each sensor are at its own rate, rad/s or m/s^2, with a common start. A remainder
+    that does not fill a block of every sensor is left out. A block with NaN (missing) is NaN.
+    Raises ValueError if the number of sensors differs.
+    """
+    if len(samples) != board.sensors:
+        raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")
+    number = min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))
+    fused = np.empty((number, board.sensors))
+    for i, (log, size) in enumerate(zip(samples, board.blocks, strict=True)):
+        fused[:, i] = np.asarray(log[: number * size]).reshape(number, size).mean(axis=1)
+    return fused
+
+
+def fuse(board: Board, weights: Constant, samples: Sequence[Array]) -> Array:
+    """Return the samples of the virtual sensor, shape (k,), of samples as of `at_fused_rate`."""
+    fused = at_fused_rate(board, samples)
+    blocks = range(0, len(fused), _BLOCK_LENGTH)
+    sums = [fused[start : start + _BLOCK_LENGTH] @ weights.values for start in blocks]
+    return np.concatenate([*sums, np.empty(0)])

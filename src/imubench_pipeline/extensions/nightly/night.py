@@ -3,18 +3,15 @@
 import contextlib
 import os
 import re
-import select
 import signal
 import subprocess
 import sys
-import termios
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from shutil import disk_usage
 from types import FrameType
-from typing import IO
 
 import yaml
 
@@ -55,9 +52,6 @@ _MAX_LAST_LINES = 20
 _TRACEBACK = re.compile(
     r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE
 )
-_ERASED_LINE = re.compile(rb".*\x1b\[2K", re.DOTALL)
-_ERASE_SEQUENCE = b"\x1b[1A\x1b[2K"
-_CONTROL_SEQUENCE = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
 _PATH_SETTINGS = ("logs", "results", "held_back")
 _OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
 _LOW_DISK_SPACE = 200e6  # bytes
@@ -68,21 +62,18 @@ _CHANGED_WHILE_READ = "it was written to while it was read: what the results say
 def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
     """Run Snakemake, which holds the lock, too; return its exit status, negative for a signal."""
     with output.open("ab", buffering=0) as file:
-        terminal = _Terminal(file) if sys.stderr.isatty() else None
         process = subprocess.Popen(
             [sys.executable, "-m", "snakemake", *arguments],
             cwd=project,
             stdin=subprocess.DEVNULL,
             stdout=file,
-            stderr=terminal.end if terminal else subprocess.STDOUT,
+            stderr=subprocess.STDOUT,
             pass_fds=(lock.descriptor,),
             env=os.environ | {TOLD: "1", INHERITED: str(lock.descriptor)},
             start_new_session=True,  # all its steps can be ended together
         )
         try:
             lock.note(snakemake=process.pid)
-            if terminal:
-                terminal.follow(process)
             return process.wait()
         except BaseException:
             # Like Ctrl-C in a terminal: Snakemake and its steps remove incomplete outputs.
@@ -94,45 +85,6 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
         finally:
             end_group(process.pid)
             process.wait()
-            if terminal:
-                os.close(terminal.begin)
-                os.close(terminal.end)
-
-
-class _Terminal:
-    """A pseudo-terminal that passes on progress, and keeps it in a file without erased lines."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-        self._pending = b""
-        self._last: bytes | None = None
-        self.begin, self.end = os.openpty()
-        with contextlib.suppress(termios.error):
-            termios.tcsetwinsize(self.end, termios.tcgetwinsize(sys.stderr.fileno()))
-
-    def follow(self, process: subprocess.Popen[bytes]) -> None:
-        """Pass on the output of a process until it ends."""
-        while True:
-            ended = process.poll() is not None
-            while select.select([self.begin], [], [], 0.0 if ended else 0.2)[0]:
-                written = os.read(self.begin, 65536)
-                sys.stderr.buffer.write(written)
-                sys.stderr.buffer.flush()
-                *lines, self._pending = (self._pending + written).split(b"\n")
-                for line in lines:
-                    self._keep(line)
-            if ended:
-                self._keep(self._pending)
-                self._keep(b"")
-                return
-
-    def _keep(self, line: bytes) -> None:
-        """Write a line to the file unless the next line overwrites it."""
-        if self._last is not None and _ERASE_SEQUENCE not in line:
-            with contextlib.suppress(OSError):  # a full disk: the steps report it themselves
-                self._file.write(self._last + b"\n")
-        text = _CONTROL_SEQUENCE.sub(b"", _ERASED_LINE.sub(b"", line)).rstrip()
-        self._last = text if text or not _ERASED_LINE.match(line) else None
 
 
 def find_errors(path: Path) -> list[str]:

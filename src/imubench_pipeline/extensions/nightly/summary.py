@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
@@ -29,48 +30,20 @@ from imubench_pipeline.report.run_summary import (
 from imubench_pipeline.tables.datapackage import read_software
 from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
-from imubench_pipeline.words.numbers import Unit
+from imubench_pipeline.words.numbers import Unit, duration_text
 
 
 class StateError(ValueError):
     """Raised for an unreadable state; the message names the consequence."""
 
 
-class Warned(NamedTuple):
-    """Key of a finding, without its size, which may change between runs."""
-
-    recording: str
-    channel: str | None
-    finding: str
-
-
-class Drifted(NamedTuple):
-    """Key of a change of a device."""
-
-    sensor: str
-    device: str
-    channel: str
-    parameter: str
-    recording: str
-
-    @property
-    def name(self) -> str:
-        """Sensor and name of the recording."""
-        return f"{self.sensor}/{self.recording}"
-
-
-class Leader(NamedTuple):
-    """The sensor that comes first for a requirement."""
-
-    sensor: str
-    fulfils: bool
-
-
 class Known(NamedTuple):
-    """Digest of a recording, and the reason if it was rejected."""
+    """Digest of a recording, and what a run reports once."""
 
     digest: str
-    rejected: str | None = None
+    rejected: str | None = None  # the reason
+    warned: tuple[tuple[str | None, str], ...] = ()  # channel and finding; its size may change
+    drifted: tuple[tuple[str, str, str], ...] = ()  # device, channel and parameter
 
 
 class State(BaseModel):
@@ -81,9 +54,7 @@ class State(BaseModel):
     finished: datetime
     logs: dict[str, Signature] = {}  # that were read
     recordings: dict[str, Known] = {}
-    warned: list[Warned] = []
-    drifted: list[Drifted] = []
-    leaders: dict[str, Leader | None] = {}  # by requirement
+    answers: list[str] = []  # the best sensor of each requirement, in words
     skipped: dict[str, datetime] = {}  # since when, without a break
     software: dict[str, str] = {}  # version, and digest of the settings
 
@@ -91,21 +62,17 @@ class State(BaseModel):
         """Write the state atomically."""
         write_sealed_json(self.model_dump(mode="json"), path)
 
+    def get(self, name: str) -> Known:
+        """Return what is known of a recording, possibly nothing."""
+        return self.recordings.get(name, Known(""))
+
     def without(self, names: Collection[str], before: "State | None") -> "State":
         """Return a state with the previous entries of some recordings, if there were any."""
         was = before or State(finished=self.finished)
         old = {name: was.recordings[name] for name in names if name in was.recordings}
-        others = {name: row for name, row in self.recordings.items() if name not in names}
-        return self.model_copy(
-            update={
-                "logs": {name: log for name, log in self.logs.items() if name not in names},
-                "recordings": others | old,
-                "warned": [warning for warning in self.warned if warning.recording not in names]
-                + [warning for warning in was.warned if warning.recording in names],
-                "drifted": [drift for drift in self.drifted if drift.name not in names]
-                + [drift for drift in was.drifted if drift.name in names],
-            }
-        )
+        others = {name: known for name, known in self.recordings.items() if name not in names}
+        logs = {name: log for name, log in self.logs.items() if name not in names}
+        return self.model_copy(update={"logs": logs, "recordings": others | old})
 
 
 def read_state(path: Path) -> State | None:
@@ -129,7 +96,7 @@ class RunRows:
     fixed_bias: list[FixedBiasRow]
     failures: list[FailureRow]
     findings: list[FindingRow]
-    drift: list[DriftRow]
+    drift: list[DriftRow]  # of devices that have changed
     ranking: list[RankingRow]
     software: Mapping[str, str]
 
@@ -146,7 +113,7 @@ def load_tables(results: Path) -> RunRows:
         fixed_bias=rows(FixedBiasRow),
         failures=rows(FailureRow),
         findings=rows(FindingRow),
-        drift=rows(DriftRow),
+        drift=[row for row in rows(DriftRow) if row.verdict == "changed"],
         ranking=rows(RankingRow),
         software=read_software(results),
     )
@@ -164,6 +131,12 @@ def make_state(
         for row in tables.recordings
         if row.status == "rejected"
     }
+    warned: dict[str, set[tuple[str | None, str]]] = defaultdict(set)
+    for finding in select_warnings(tables.findings):
+        warned[get_recording_name(finding)].add((finding.channel, finding.finding))
+    drifted: dict[str, set[tuple[str, str, str]]] = defaultdict(set)
+    for drift in tables.drift:
+        drifted[get_recording_name(drift)].add((drift.device, drift.channel, drift.parameter))
     # The digest of the rows of a recording changes with its outcome.
     digests = {get_recording_name(row): hashlib.sha256() for row in tables.recordings}
     rows: list[RecordingRow | ParameterRow | FixedBiasRow]
@@ -175,49 +148,23 @@ def make_state(
         finished=finished,
         logs=dict(logs),
         recordings={
-            name: Known(digest.hexdigest()[:16], rejected.get(name))
+            name: Known(
+                digest.hexdigest()[:16],
+                rejected.get(name),
+                tuple(sorted(warned[name], key=str)),
+                tuple(sorted(drifted[name])),
+            )
             for name, digest in digests.items()
         },
-        warned=sorted({make_warning_key(row) for row in select_warnings(tables.findings)}, key=str),
-        drifted=sorted(make_drift_keys(tables.drift)),
-        leaders=find_leaders(tables.ranking),
+        answers=[*list_best_sensors(tables.ranking, tables.recordings)],
         skipped=dict(skipped),
         software=dict(tables.software),
     )
 
 
-def make_drift_keys(drift: Iterable[DriftRow]) -> dict[Drifted, DriftRow]:
-    """Return the rows of the table ``drift`` about devices that have changed, by their keys."""
-    return {
-        Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording): row
-        for row in drift
-        if row.verdict == "changed"
-    }
-
-
 def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
     """Return sensor and name of the recording of a row."""
     return f"{row.sensor}/{row.recording}"
-
-
-def make_warning_key(row: FindingRow) -> Warned:
-    """Return the key of a finding."""
-    return Warned(get_recording_name(row), row.channel, row.finding)
-
-
-def find_leaders(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
-    """Return the best sensor for each requirement; None if no sensor can be ranked."""
-    first: dict[str, Leader | None] = {}
-    margins: dict[str, float] = {}
-    for row in ranking:
-        if row.decides:
-            name = row.requirement
-            first.setdefault(name, None)
-            margin = row.margin or 0.0
-            if row.rank == 1 and (name not in margins or margin > margins[name]):
-                first[name] = Leader(row.sensor, row.verdict not in ("likely_fails", "fails"))
-                margins[name] = margin
-    return first
 
 
 Outcome = Literal["fine", "flagged", "failed"]
@@ -251,50 +198,6 @@ class Rejected(BaseModel):
     new: bool
 
 
-class Failed(BaseModel):
-    """A step that failed for a recording or a whole sensor, which is omitted."""
-
-    sensor: str
-    recording: str | None
-    step: str
-    cause: str
-    reason: str
-
-
-class NewWarning(BaseModel):
-    """A finding that puts results in doubt."""
-
-    recording: str
-    channel: str | None
-    finding: str
-    detail: str
-
-
-class Drift(BaseModel):
-    """A parameter of a device outside the interval from its earlier recordings."""
-
-    sensor: str
-    device: str
-    channel: str
-    parameter: str
-    recording: str
-    value: float | None
-    expected_lower: float | None
-    expected_upper: float | None
-    unit: str
-    reasons: tuple[str, ...]
-    reanalysed: bool = False  # with the same log, so its value may have changed by the analysis
-
-
-class First(BaseModel):
-    """The best sensor for a requirement, if it has changed."""
-
-    requirement: str
-    sensor: str | None
-    before: str | None
-    said: str
-
-
 class Changes(BaseModel):
     """Changes since the last successful nightly run; without one that was read: failed."""
 
@@ -304,12 +207,12 @@ class Changes(BaseModel):
     new: list[str] = []
     changed: list[Changed] = []
     removed: list[str] = []
-    failed: list[Failed] = []
+    failed: list[FailureRow] = []
     rejected: list[Rejected] = []
-    warnings: list[NewWarning] = []
-    drift: list[Drift] = []
+    warnings: list[FindingRow] = []
+    drift: list[DriftRow] = []
     reanalysis: list[str] = []  # effect of another version, code or settings on the same logs
-    first: list[First] = []
+    answers: list[str] = []  # the best sensor of each requirement whose answer has changed
 
 
 class Summary(Changes):
@@ -333,22 +236,8 @@ def compare_states(
     was = before or State(finished=after.finished)
     written_to = set(without)
     now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
-    known_warnings, known_drift = set(was.warned), set(was.drifted)
-    first = []
-    for name, leader in after.leaders.items():
-        old = was.leaders.get(name)
-        if name not in was.leaders or leader != old:
-            of_it = [row for row in tables.ranking if row.requirement == name]
-            first.append(
-                First(
-                    requirement=name,
-                    sensor=leader and leader.sensor,
-                    before=old and f"{old.sensor}{', which failed it' * (not old.fulfils)}",
-                    said=next(list_best_sensors(of_it, tables.recordings)),
-                )
-            )
     failed = [
-        Failed.model_validate(row, from_attributes=True)
+        row
         for row in tables.failures
         if row.recording is None or get_recording_name(row) not in written_to
     ]
@@ -356,15 +245,16 @@ def compare_states(
         Rejected(
             recording=name,
             reason=outcome.rejected,
-            new=was.recordings.get(name, Known("")).rejected != outcome.rejected,
+            new=was.get(name).rejected != outcome.rejected,
         )
         for name, outcome in now.items()
         if outcome.rejected is not None
     ]
     warnings = [
-        NewWarning.model_validate({**row.columns(), "recording": get_recording_name(row)})
+        row
         for row in select_warnings(tables.findings)
-        if get_recording_name(row) not in written_to and make_warning_key(row) not in known_warnings
+        if (name := get_recording_name(row)) not in written_to
+        and (row.channel, row.finding) not in was.get(name).warned
     ]
     changed = [
         name
@@ -373,9 +263,10 @@ def compare_states(
     ]
     reanalysed = {name for name in changed if was.logs.get(name) == after.logs.get(name)}
     drift = [
-        Drift.model_validate(row.columns() | {"reanalysed": get_recording_name(row) in reanalysed})
-        for key, row in make_drift_keys(tables.drift).items()
-        if key.name not in written_to and key not in known_drift
+        row
+        for row in tables.drift
+        if (name := get_recording_name(row)) not in written_to
+        and (row.device, row.channel, row.parameter) not in was.get(name).drifted
     ]
     flagged = warnings or drift or any(rejection.new for rejection in rejected)
     return Changes(
@@ -398,7 +289,7 @@ def compare_states(
         rejected=rejected,
         warnings=warnings,
         drift=drift,
-        first=first,
+        answers=[answer for answer in after.answers if answer not in was.answers],
     )
 
 
@@ -433,19 +324,19 @@ def format_summary(summary: Summary) -> str:
         counts += f"; {len(summary.failed)} failed"
     counts += "".join(f"\n{line}" for line in summary.files)
     since = f"since {_format_time(summary.since)}" if summary.since else "the first run"
-    minutes, seconds = divmod(round(summary.seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    took = f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s"
     finished = _format_time(summary.finished)
-    lines = [f"imubench nightly: {summary.outcome}, {finished}, took {took}"]
+    lines = [
+        f"imubench nightly: {summary.outcome}, {finished}, took {duration_text(summary.seconds)}"
+    ]
     if summary.failure:
         lines += ["", "why it failed:", *(f"  {fold_text(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
+    reanalysed = {change.recording for change in summary.changed if not change.new_log}
     sections = {
         "failed, omitted in the report, and tried again next time": [
-            *list_failures(FailureRow.from_json(dict(one)) for one in summary.failed)
+            *list_failures(summary.failed)
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
@@ -461,14 +352,15 @@ def format_summary(summary: Summary) -> str:
             for rejection in rejected
         ],
         "new warnings": [
-            f"{warning.recording}: {f'{warning.channel}: ' if warning.channel else ''}"
+            f"{get_recording_name(warning)}: {f'{warning.channel}: ' if warning.channel else ''}"
             f"{warning.finding.replace('_', ' ')}: {warning.detail}"
             for warning in summary.warnings
         ],
-        "devices that have changed": [_describe_drift(drift) for drift in summary.drift],
-        "first for a requirement": [
-            lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
+        "devices that have changed": [
+            _describe_drift(drift, get_recording_name(drift) in reanalysed)
+            for drift in summary.drift
         ],
+        "other answers to a requirement": summary.answers,
         "repaired after an earlier run": summary.put_right,
     }
     for title, entries in sections.items():
@@ -480,7 +372,7 @@ def format_summary(summary: Summary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _describe_drift(drift: Drift) -> str:
+def _describe_drift(drift: DriftRow, reanalysed: bool) -> str:
     unit = Unit(drift.unit, 1.0, drift.parameter)
     low, high = drift.expected_lower, drift.expected_upper
     size, limits = unit.estimate_texts(drift.value, low, high)
@@ -490,7 +382,7 @@ def _describe_drift(drift: Drift) -> str:
         f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
         f"{drift.recording}{expected}"
         + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)
-        + "; analysed again with the same log: the analysis may be the cause" * drift.reanalysed
+        + "; analysed again with the same log: the analysis may be the cause" * reanalysed
     )
 
 

@@ -34,6 +34,7 @@ from imubench_pipeline.noise.variance_covariance import compute_variance_covaria
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import convert_to_si
+from imubench_pipeline.words.numbers import number_text
 
 DURATION = 36_000.0  # s; assumed, since the paper recommends ten hours
 
@@ -183,7 +184,6 @@ def find_lowest_point(model: NoiseModel) -> tuple[float, float]:
     return float(tau[place]), math.sqrt(float(variance[place]))
 
 
-_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _FIGURES = read_paper("maia").figures
 _TABLE_4 = {
     symbol: {row["key"]: row for row in _FIGURES[table]}
@@ -204,19 +204,14 @@ def read_manufacturer(symbol: str, key: str) -> float:
     return parse_number(_TABLE_4[symbol][key]["digits"])
 
 
-def _format_power(value: float, digits: int) -> str:
-    """Return a number with these digits, such as 8.4·10⁻⁵."""
-    text = f"{value:.{digits}g}"
-    if "e" not in text and value >= 1e-2:
-        return text
-    mantissa, power = f"{value:.{digits - 1}e}".split("e")
-    return f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
+def _format_as_printed(value: float, digits: int = 2) -> str:
+    return number_text(value, digits).replace(".", ",").replace("×", "·")
 
 
 def _describe(row: ParameterRow | None, what: str) -> str:
     if row is None:
         return ""
-    text = row.status.replace("_", " ") if row.value is None else _format_power(row.value, 3)
+    text = row.status.replace("_", " ") if row.value is None else number_text(row.value, 3)
     return f"{what}: {text}"
 
 
@@ -258,7 +253,7 @@ def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
     fields = {
         "tau": tau,
         "peak": peak,
-        "floor": _format_power(floor, 2).replace(".", ","),
+        "floor": _format_as_printed(floor),
         "side": "before" if tau < PEAK_TAU * model.T_B else "past",
         "share": 100.0 * process / floor,  # of the process in that deviation, %
     }
@@ -285,7 +280,7 @@ def compute_error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
     return Result(
         value=compute(channel.table_1),
         printed=by_table_2,
-        fields={"by_table_2": f"{by_table_2:.2g}".replace(".", ",")},
+        fields={"by_table_2": _format_as_printed(by_table_2)},
     )
 
 
@@ -353,8 +348,7 @@ def compare_with_vendor(run: Evidence, symbol: str, key: str, table: str) -> Res
     else:
         value = find_lowest_point(model)[1] / vendor
     printed = float(getattr(model, symbol)) / read_manufacturer(symbol, key)
-    own = f"{printed:.2f}".replace(".", ",")
-    return Result(value=value, printed=printed, fields={"own": own})
+    return Result(value=value, printed=printed, fields={"own": _format_as_printed(printed, 3)})
 
 
 def compute_slopes(_: Evidence) -> Result:
@@ -408,9 +402,8 @@ def compute_datasheet_line(_: Evidence, key: str) -> Result:
 def compute_datasheet_floor(_: Evidence, key: str) -> Result:
     """Return the lowest point of the optimised curve, with 0.664 B of the datasheet."""
     floor = FLOOR * read_manufacturer("B", key)
-    shown = _format_power(floor, 2).replace(".", ",")
     level = find_lowest_point(CHANNELS[key].table_2)[1]
-    return Result(value=level, printed=floor, fields={"floor": shown})
+    return Result(value=level, printed=floor, fields={"floor": _format_as_printed(floor)})
 
 
 def integrate_density(model: NoiseModel, tau: float) -> float:

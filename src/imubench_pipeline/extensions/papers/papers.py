@@ -138,7 +138,7 @@ def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
         result = evaluate(line, evidence)
         fields = {**result.fields, **line.fields}
         printed_unit = line.unit.format(**fields)
-        unit = paper.units.get(printed_unit, Unit(printed_unit))
+        unit = paper.units.get(printed_unit, Unit(si=printed_unit))
         if line.found:
             value = parse_number(line.found.format(**fields)) * unit.scale
             result = replace(result, value=value)

@@ -1,4 +1,4 @@
-"""The papers as printed: one YAML file of ``data/`` for each, read into frozen dataclasses."""
+"""The papers as printed: one YAML file of ``data/`` for each."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,8 +28,7 @@ Verdict = Literal[
 _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻,", "0123456789-.")
 
 
-@dataclass(frozen=True)
-class Drawn:
+class Drawn(Strict):
     """A curve that corresponds to figures of a paper."""
 
     figures: str  # of the paper
@@ -39,16 +38,14 @@ class Drawn:
     methods: str  # methods with a curve, in addition to the curve of the log
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(Strict):
     """A unit as a paper prints it."""
 
     si: str
     scale: float = 1.0  # SI per printed unit
 
 
-@dataclass(frozen=True, kw_only=True)
-class Line:
+class Line(Strict):
     """One line of a paper; its texts are templates for `str.format`."""
 
     place: str  # "Table 3", "Figure 5", "Equation 26" or "Section 6", as numbered there
@@ -66,11 +63,10 @@ class Line:
     page: str = ""  # page of the report with the counterpart, and its anchor if any
     check: str  # test or benchmark of the line: "tests/...::name" or a file
     tolerance: float = 0.05  # relative difference that still agrees
-    fields: Mapping[str, str] = field(default_factory=dict)  # for the templates
+    fields: Mapping[str, str] = {}  # for the templates
 
 
-@dataclass(frozen=True, kw_only=True)
-class Paper:
+class Paper(Strict):
     """A paper with its lines, in the order of the paper."""
 
     key: str  # "maia"
@@ -82,10 +78,6 @@ class Paper:
     units: Mapping[str, Unit]  # by the printed unit; others are SI
     figures: Mapping[str, tuple[Mapping[str, str], ...]]  # printed tables, row by row
     lines: tuple[Line, ...]
-
-
-class _File(Strict):
-    paper: Paper
 
 
 class Explained(Strict):
@@ -121,7 +113,7 @@ def read_paper(key: str) -> Paper:
     path = _FOLDER / f"{key}.yaml"
     data: Any = read_yaml(path)
     lines = list(_expand(data.pop("lines"), data.pop("defaults"), {}, data["figures"]))
-    return parse(_File, {"paper": data | {"key": key, "lines": lines}}, str(path)).paper
+    return parse(Paper, data | {"key": key, "lines": lines}, str(path))
 
 
 def _expand(

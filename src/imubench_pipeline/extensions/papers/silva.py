@@ -17,7 +17,6 @@ from imubench_pipeline.extensions.earth_rate.published import PrintedRun, comput
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
-    PAPER_DESIGN,
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_PERIOD,
@@ -89,7 +88,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 def make_printed_run(run: str) -> PrintedRun:
     """Return a printed run, and the sigma of the mean over pairs by the printed noise."""
     duration = 60.0 * PAPER_MINUTES[run]
-    sigma = compute_allowed_sigmas(PAPER_DESIGN, duration, PAPER_MODEL).sigma
+    sigma = compute_allowed_sigmas(design_paper_run(PAPER_MINUTES[run]), PAPER_MODEL).sigma
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
@@ -217,7 +216,7 @@ def compute_error_of_mean(_: Evidence) -> Result:
         name: float(known_rate.mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
         for name, start in known_rate.STARTS.items()
     }
-    pair = compute_allowed_sigmas(PAPER_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL).sigma
+    pair = compute_allowed_sigmas(design_paper_run(2.0 * PAPER_PERIOD / 60.0), PAPER_MODEL).sigma
     errors = {name: one / math.cos(ASSUMED_LATITUDE) / hour for name, one in along_axis.items()}
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
@@ -226,7 +225,7 @@ def compute_filter_gain(_: Evidence) -> Result:
     """Return the least and greatest reduction of sigma by a filter with unknown rate, %."""
     gains = []
     for run in PRINTED:
-        sigmas = compute_allowed_sigmas(PAPER_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
+        sigmas = compute_allowed_sigmas(design_paper_run(PAPER_MINUTES[run]), PAPER_MODEL)
         gains.append(100.0 * (1.0 - sigmas.sigma_filter / sigmas.sigma))
     return Result(fields={"least": min(gains), "most": max(gains)})
 

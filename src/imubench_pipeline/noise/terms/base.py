@@ -136,9 +136,6 @@ class Term(ABC):
     role: ClassVar[Role]
     parameters: ClassVar[tuple[TermParameter, ...]]
 
-    states: ClassVar[tuple[str, ...]]
-    """Names of the states of `state_space`."""
-
     @abstractmethod
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """Two-sided power spectral density in continuous time, SI^2/Hz."""
@@ -319,7 +316,7 @@ def drives_of(terms: Iterable[Term]) -> Drives:
     return Drives(white, flicker, times, densities)
 
 
-_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
+_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters")
 """Class variables that every kind must define."""
 
 

@@ -57,7 +57,6 @@ class Flicker(Term):
     word = "flicker"
     role = Role.SLOW
     parameters = (gauss_markov.BIAS_INSTABILITY,)
-    states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """B^2 / (2 pi f)."""

@@ -56,7 +56,6 @@ class GaussMarkov(base.Term):
         BIAS_INSTABILITY,
         base.TermParameter("T_B", "correlation time", 0.0, 1.0, search=CORRELATION_TIMES),
     )
-    states = ("z_G",)
 
     @property
     def density(self) -> float:

@@ -31,7 +31,6 @@ class Quantization(base.Term):
     word = "Q"
     role = base.Role.NOT_GROWING
     parameters = (base.TermParameter("Q", "quantization", 1.0, 1.0),)
-    states = ("z_Q", "z_Q before")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """(4 Q^2 / T) sin^2(pi f T): it depends on the sampling; ValueError without an interval."""
@@ -114,7 +113,6 @@ class WhiteNoise(base.Term):
     word = "N"
     role = base.Role.WHITE
     parameters = (base.TermParameter("N", "noise density", 1.0, 0.5),)
-    states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """N^2."""
@@ -198,7 +196,6 @@ class RandomWalk(base.Term):
     word = "K"
     role = base.Role.RANDOM_WALK
     parameters = (base.TermParameter("K", "random walk", 1.0, -0.5),)
-    states = ("z_K",)
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """K^2 / (2 pi f)^2."""
@@ -280,7 +277,6 @@ class Ramp(base.Deterministic):
     word = "R"
     role = base.Role.SLOW
     parameters = (base.TermParameter("R", "ramp", 1.0, -1.0, signed=True),)
-    states = ("z_R", "z_R slope")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """R^2 / (2 pi f)^3, as IEEE Std 952 assigns it; a ramp has no density proper."""

@@ -27,7 +27,6 @@ class Sinusoid(Deterministic):
         TermParameter("amplitude", "amplitude", 1.0, 0.0),
         TermParameter("frequency", "frequency", 0.0, -1.0),
     )
-    states = ("z_S", "z_S quadrature")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """0: the power amplitude^2 / 2 of a line has no density."""

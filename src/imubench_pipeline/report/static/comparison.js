@@ -164,7 +164,7 @@ function verdictCell(ratio, first, second) {
   const better = chosen.find((one) => one.letter === letter);
   if (better) cell.append(signOf({ ...pageData.looks.sensors[better.sensor], line: false }));
   cell.append(text);
-  if (ratio.reasons.length > 0) cell.append(" ", element("span", { className: "why", textContent: ratio.reasons.join("; ") }));
+  if (ratio.reasons.length > 0) cell.append(" ", element("span", { className: "why", textContent: `(${ratio.reasons.join("; ").replaceAll("the first", first.letter).replaceAll("the second", second.letter)})` }));
   return cell;
 }
 

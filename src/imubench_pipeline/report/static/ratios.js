@@ -73,5 +73,6 @@ function ratioText({ value, lower, upper }) {
   const digits = countDigits(value, lower, upper);
   if (lower === null && upper === null) return "–";
   if (upper === null) return `above ${numberText(lower, digits)}`;
-  return `${numberText(lower ?? 0, digits)} to ${numberText(upper, digits)}`;
+  if (!lower) return `below ${numberText(upper, digits)}`;
+  return `${numberText(lower, digits)} to ${numberText(upper, digits)}`;
 }

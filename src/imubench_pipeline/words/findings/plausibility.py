@@ -52,7 +52,7 @@ class SlowSampling(base.FindingData, affects=base.NONE):
         return (
             f"The log is sampled at {number_text(self.rate)} Hz, and most sensors are faster. "
             "If samples were skipped and not averaged, noise of higher frequencies is folded into "
-            "N. N is then larger than on a data sheet. Log faster, or average before"
+            "N. N is then larger than on a datasheet. Log faster, or average before"
         )
 
 
@@ -93,7 +93,7 @@ class SuspiciousUnit(
     gravity: float | None = None  # norm of the mean acceleration, m/s², if it shows the mistake
     noise: float | None = None  # white noise, SI, if it shows the mistake
     usual: tuple[float, float] | None = None  # usual limits of the white noise, SI
-    printed: bool = False  # whether they are from the data sheet of the sensor, and not of any
+    printed: bool = False  # whether they are from the datasheet of the sensor, and not of any
     mean: float | None = None  # rate of all gyros, rad/s, if it is unusual too
 
     def text(self, channel: str) -> str:
@@ -110,9 +110,7 @@ class SuspiciousUnit(
             if self.mean is not None:
                 seen += f", and the mean rate {base.value_text(self.mean, channel)}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
-            usual = (
-                f"expected {limits} {'by its data sheet' if self.printed else 'for a MEMS gyro'}"
-            )
+            usual = f"expected {limits} {'by its datasheet' if self.printed else 'for a MEMS gyro'}"
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
         return (
             f"The unit of {name} is probably wrong: {seen}; {usual}. If the log is in "
@@ -139,7 +137,7 @@ class GravityNorm(base.FindingData, affects=base.ALL, doubt="the mean accelerati
 
 
 class NoiseUnlikeDatasheet(
-    base.FindingData, affects=base.ALL, doubt="the noise of {channels} differs from its data sheet"
+    base.FindingData, affects=base.ALL, doubt="the noise of {channels} differs from its datasheet"
 ):
     """The white noise is far from the printed one, and no unit explains it."""
 
@@ -154,7 +152,7 @@ class NoiseUnlikeDatasheet(
         return (
             f"The noise of {name} is {unit.text(self.noise)} {unit.sign}, "
             f"{number_text(self.noise / self.printed, 3)} times the "
-            f"{unit.text(self.printed)} of its data sheet. "
+            f"{unit.text(self.printed)} of its datasheet. "
             f"Check {rate}scale, range and column of the channel, and whether it is this sensor"
         )
 
@@ -191,7 +189,7 @@ class Turning(base.FindingData, affects=base.ALL, unfit=True, doubt="the sensor 
     largest: float | None = None
     """Largest plausible offset of the gyro, rad/s; None: gravity shows the turn."""
     offset_of: str | None = None
-    """``data sheet``, or the price class, that limits the offset; None: any gyro."""
+    """``datasheet``, or the price class, that limits the offset; None: any gyro."""
     swept: float | None = None  # angle by which gravity turns, rad
     gyro_rate: float | None = None
     """Mean rate of the gyros about the axis of gravity's turn, if it agrees, rad/s."""
@@ -199,7 +197,7 @@ class Turning(base.FindingData, affects=base.ALL, unfit=True, doubt="the sensor 
     def text(self, channel: str) -> str:
         rate = number_text(math.degrees(self.rate), 3)
         if self.largest is not None:
-            limit = {None: "of any gyro", "data sheet": "by its data sheet"}.get(
+            limit = {None: "of any gyro", "datasheet": "by its datasheet"}.get(
                 self.offset_of, f"of price class {self.offset_of}"
             )
             return (

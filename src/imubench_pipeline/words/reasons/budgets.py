@@ -1,4 +1,4 @@
-"""Assumptions and reasons of error budgets, by a log or by a data sheet."""
+"""Assumptions and reasons of error budgets, by a log or by a datasheet."""
 
 from collections.abc import Mapping, Sequence
 

@@ -6,12 +6,12 @@ from imubench_pipeline.words.numbers import number_text
 
 ONE_LOG_OBSTACLES: Mapping[str, str] = {
     "bias_repeatability": "a spread between runs: see the table repeatability",
-    "drift": "the data sheet does not define this drift",
+    "drift": "the datasheet does not define this drift",
     "temperature_total": (
-        "a total over the temperature range of the data sheet, and the log has another range"
+        "a total over the temperature range of the datasheet, and the log has another range"
     ),
     "temperature_rms": (
-        "an rms over the temperature profile of the data sheet, and the log has another profile"
+        "an rms over the temperature profile of the datasheet, and the log has another profile"
     ),
 }
 """Why figures cannot be compared with one log."""
@@ -56,7 +56,7 @@ def curve_plateau(floor: float) -> str:
 
 
 def density_side(sidedness: str, *, assumed: bool) -> str:
-    unsure = " (assumed, as the data sheet does not state it)" if assumed else ""
+    unsure = " (assumed, as the datasheet does not state it)" if assumed else ""
     root = " / √2" if sidedness == "one-sided" else ""
     return f"{sidedness} density{unsure}: N is the density{root}"
 

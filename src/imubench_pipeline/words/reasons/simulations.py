@@ -20,14 +20,14 @@ IN_NO_TABLE = "it is in no table of its sensor"
 
 
 def of_data_sheet(name: str, document: str | None) -> str:
-    """Return the source of a model; ``document``: of the data sheet, if it is named."""
-    return f"the data sheet of {name}" + (f": {document}" if document else "")
+    """Return the source of a model; ``document``: of the datasheet, if it is named."""
+    return f"the datasheet of {name}" + (f": {document}" if document else "")
 
 
 def printed_figure(
     label: str, value: float, unit: str, kind: str, reason: str | None = None
 ) -> str:
-    text = f"{label} {number_text(value)} {unit}: {kind}, data sheet"
+    text = f"{label} {number_text(value)} {unit}: {kind}, datasheet"
     return f"{text} ({reason})" if reason else text
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles
 from imubench_pipeline.extensions.calibration.alignment.coarse import (
-    coarse_accuracy,
     coarse_alignment,
+    coarse_sigma,
     mean_vectors,
 )
 from imubench_pipeline.extensions.calibration.alignment.fine import (
@@ -122,8 +122,8 @@ def accuracies(
                 positions = Positions.turned_about_z(
                     [0.0, math.pi], dwell=dwell, turning=turning, block=block, rate=rate
                 )
-            coarse = coarse_accuracy(triad, positions, site, _LEVEL_ATTITUDE)
-            yield Accuracy(number, "coarse", time, coarse.sigma)
+            coarse = coarse_sigma(triad, positions, site, _LEVEL_ATTITUDE)
+            yield Accuracy(number, "coarse", time, coarse)
             fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
             errors = None
             if runs and rng is not None and time == times[-1]:

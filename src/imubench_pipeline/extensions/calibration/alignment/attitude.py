@@ -16,18 +16,17 @@ from imubench_pipeline.typing import Array
 MIN_COS_PITCH = 1e-6  # below it roll and heading are not separable (gimbal lock)
 
 
-def matrix(roll: float, pitch: float, heading: float) -> Array:
-    """Return the matrix from body to navigation frame, shape (3, 3), of angles in rad."""
+def matrix(roll: ArrayLike, pitch: ArrayLike, heading: ArrayLike) -> Array:
+    """Return matrices from body to navigation frame, (..., 3, 3), of angles, rad, shape (...)."""
     (cr, cp, ch), (sr, sp, sh) = (
-        [float(f(angle)) for angle in (roll, pitch, heading)] for f in (np.cos, np.sin)
+        [f(np.asarray(angle)) for angle in (roll, pitch, heading)] for f in (np.cos, np.sin)
     )
-    return np.array(
-        [
-            [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
-            [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    rows = [
+        [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
+        [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
 
 def euler_angles(attitude: Array) -> Array:
@@ -61,11 +60,6 @@ def rotation(vector: ArrayLike) -> Array:
     sine_part = np.sinc(angle / np.pi)
     cosine_part = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     return np.asarray(np.eye(3) + sine_part * across + cosine_part * across @ across)
-
-
-def correct(attitude: Array, psi: Array) -> Array:
-    """Return an attitude, (..., 3, 3), corrected by its error psi, rad, shape (..., 3)."""
-    return np.asarray(rotation(psi) @ attitude)
 
 
 def euler_jacobian(attitude: Array) -> Array:

@@ -9,22 +9,12 @@ Wiley 1971, chapter 9)
     psi_N = df_E / g,   psi_E = -df_N / g,   psi_D = dw_E / (w_ie cos(L)) - tan(L) psi_N.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.typing import Array
-
-
-@dataclass(frozen=True)
-class CoarseAccuracy:
-    """Uncertainty of an attitude."""
-
-    psi: Array  # shape (3, 3); covariance of the small errors about north, east and down, rad^2
-    sigma: Array  # shape (3,); standard deviations of roll, pitch and heading, rad
 
 
 def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
@@ -46,17 +36,18 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     turns. The block means are of gyros and accelerometers x, y, z, rad/s and m/s^2, shape (..., b,
     6).
     """
-    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+    weighted = _weigh_blocks(positions)
     rate = np.einsum("bij,...bj->...i", weighted, means[..., :3])
     force = np.einsum("bij,...bj->...i", weighted, means[..., 3:])
     return force, rate
 
 
-def coarse_accuracy(
-    triad: Triad, positions: Positions, site: Site, attitude: Array
-) -> CoarseAccuracy:
-    """Return the uncertainty of coarse alignment about a true attitude, shape (3, 3)."""
-    weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
+def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array) -> Array:
+    """Return standard deviations of coarse alignment about a true attitude, shape (3, 3).
+
+    They are of roll, pitch and heading, rad, shape (3,).
+    """
+    weighted = _weigh_blocks(positions)
     of_sensor = []
     for three in (triad.axes[:3], triad.axes[3:]):
         covariance = np.zeros((3, 3))
@@ -73,15 +64,15 @@ def coarse_accuracy(
     of_rate[2, 1] = 1.0 / north
     psi = of_rate @ of_sensor[0] @ of_rate.T + of_force @ of_sensor[1] @ of_force.T
     euler = euler_jacobian(attitude)
-    return CoarseAccuracy(psi, np.sqrt(np.diag(euler @ psi @ euler.T)))
+    return np.sqrt(np.diag(euler @ psi @ euler.T))
 
 
-def _compute_weights(positions: Positions) -> Array:
-    """Return block weights with sum 1: dwells equal, blocks of a dwell by their samples."""
+def _weigh_blocks(positions: Positions) -> Array:
+    """Return the matrices of blocks, (b, 3, 3), with weights of sum 1: equal for all dwells."""
     blocks = positions.blocks
     of_dwell = np.bincount(blocks.dwell, weights=blocks.count)
-    dwells_with_samples = np.count_nonzero(of_dwell)
-    return np.asarray(blocks.count / of_dwell[blocks.dwell] / dwells_with_samples)
+    weights = blocks.count / of_dwell[blocks.dwell] / np.count_nonzero(of_dwell)
+    return np.asarray(weights[:, None, None] * positions.of_blocks)
 
 
 def _build_triad(first: Array, second: Array) -> Array:

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import (
-    correct,
     cross_matrix,
     euler_jacobian,
+    rotation,
 )
 from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
@@ -59,11 +59,6 @@ class FineAlignment:
         )
         self._filter = BlockFilter(axes, seen, np.eye(3) * INITIAL_ANGLE_SIGMA)
         self._euler = euler_jacobian(attitude)
-
-    @property
-    def time(self) -> Array:
-        """End of each block, s, shape (b,)."""
-        return self.positions.blocks.end
 
     @property
     def psi_covariance(self) -> Array:
@@ -116,7 +111,7 @@ class FineAlignment:
         psi = states[:, :, :3]
         white = np.linalg.solve(self._filter.innovation_roots, innovations[..., None])[..., 0]
         return Aligned(
-            correct(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
+            rotation(psi[:, -1]) @ attitudes, psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
 
 

@@ -59,23 +59,6 @@ class Triad:
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} is {value}, expected a number from 0")
 
-    @classmethod
-    def of_one_kind(
-        cls,
-        gyro: NoiseModel,
-        accelerometer: NoiseModel,
-        *,
-        gyro_bias: float,
-        accelerometer_bias: float,
-    ) -> "Triad":
-        """Return a triad with equal axes; the biases are in rad/s and m/s^2."""
-        return cls(
-            gyros=(gyro,) * 3,
-            accelerometers=(accelerometer,) * 3,
-            gyro_bias=gyro_bias,
-            accelerometer_bias=accelerometer_bias,
-        )
-
     @property
     def axes(self) -> list[tuple[NoiseModel, float]]:
         """Noise and sigma of the fixed bias of gyros x, y, z and accelerometers x, y, z."""

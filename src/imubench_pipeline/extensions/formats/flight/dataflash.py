@@ -6,6 +6,7 @@ its fields, which a message FMT declares. The batch sampler (ISBH, ISBD) is not 
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -68,10 +69,7 @@ class DataFlashMessages(Messages):
             if of_kind is not None and kind in instances:
                 number = payload[instances[kind]]
                 if (kind, number) not in numbered:
-                    name = f"{of_kind.name}_{number}"
-                    numbered[kind, number] = Kind(
-                        name, of_kind.fields, of_kind.units, of_kind.factors
-                    )
+                    numbered[kind, number] = replace(of_kind, name=f"{of_kind.name}_{number}")
                 of_kind = numbered[kind, number]
             if of_kind is not None and self._is_wanted(of_kind):
                 yield of_kind.name, payload
