@@ -89,11 +89,6 @@ class Question:
         """Quantities that are needed to compute it."""
         return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
-    @property
-    def uses(self) -> tuple[Measured, ...]:
-        """Quantities that are used if they are recorded: accelerometers level a gyro for north."""
-        return MEASURED if self.error == "north" else self.needs
-
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
         if self.error == "north":
@@ -350,7 +345,8 @@ def select_channels(
 ) -> dict[Measured, str | None] | None:
     """Return the gyro and accelerometer channels to use; None if one of them is missing."""
     chosen: dict[Measured, str | None] = {"gyro": None, "accel": None}
-    for quantity in question.uses:
+    # Accelerometers level a gyro for north, if they are recorded.
+    for quantity in MEASURED if question.error == "north" else question.needs:
         channels = _list_channels(quantity, axes)
         if not channels and quantity in question.needs:
             return None

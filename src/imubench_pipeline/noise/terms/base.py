@@ -207,9 +207,9 @@ class Term(ABC):
 
         By default jointly with the one state of the term; TypeError if it has another number.
         """
-        if len(self.states) != 1:
-            raise TypeError(f"{self} has {len(self.states)} states; expected one")
         space = self.state_space(1.0 / rate)
+        if len(space.output) != 1:
+            raise TypeError(f"{self} has {len(space.output)} states; expected one")
         return draw_block_sums(space, self.start(rng, 1.0 / rate), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading | None:
