@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import allan_variance, cluster_sizes
 from imubench_pipeline.extensions.fusion.board import Board, Shared
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
-from imubench_pipeline.extensions.fusion.weights import best_constant, equal, fuse
+from imubench_pipeline.extensions.fusion.weights import best_weights, fuse
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -68,7 +68,8 @@ def main() -> None:
     print(f"{'predicted / measured at tau of, s':34s} {tau}   inside  common at the end")
     hits, points = 0.0, 0
     for name, board in boards():
-        ways = {"equal": equal(board.sensors), "10 s": best_constant(board, 10.0)}
+        equal = np.full(board.sensors, 1.0 / board.sensors)
+        ways = {"equal": equal, "10 s": best_weights(board, 10.0)}
         variances = {way: np.zeros(len(sizes)) for way in ways}
         inside = {way: np.zeros(len(sizes)) for way in ways}
         predicted = {way: fused_allan(board, how, sizes / RATE) for way, how in ways.items()}

@@ -32,7 +32,7 @@ def declared(number: int = 9, spread: float = 0.0, **axis: Any) -> SimulatedReco
 def test_equal_units_have_equal_weights_and_noise_reduced_by_sqrt_n() -> None:
     models = [model.axes["gyro_x"].noise for model in make_specimens(declared())]
     _, weights = make_board(models, 20.0)
-    assert weights.values == pytest.approx(np.full(9, 1 / 9))
+    assert weights == pytest.approx(np.full(9, 1 / 9))
     fused = fuse_models(models, weights)
     for name in ("N", "B", "K"):
         assert getattr(fused, name) == pytest.approx(getattr(models[0], name) / 3.0)
@@ -44,7 +44,7 @@ def test_specimens_that_differ_are_weighed_by_their_white_noise() -> None:
     noise = np.array([model.N for model in models])
     assert 0.1 < np.std(np.log(noise)) < 0.6
     _, weights = make_board(models, 20.0)
-    assert weights.values == pytest.approx(noise**-2 / np.sum(noise**-2))
+    assert weights == pytest.approx(noise**-2 / np.sum(noise**-2))
     assert fuse_models(models, weights).N == pytest.approx(np.sum(noise**-2) ** -0.5)
 
 

@@ -9,7 +9,6 @@ from imubench_pipeline.extensions.fusion.board import Board
 from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
 from imubench_pipeline.extensions.fusion.fusion import yield_fusion_rows
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
-from imubench_pipeline.extensions.fusion.weights import equal
 from imubench_pipeline.navigation.ratios import (
     ComparedChannel,
     TemperaturePart,
@@ -99,7 +98,7 @@ def test_that_many_on_a_board_reach_the_better_sensor(common: dict[str, float]) 
     assert n >= 7.3 * (1 - 1e-9)
     for number, enough in ((math.floor(n), False), (math.ceil(n), True)):
         of_board = Board.alike(FLICKER, number, 1000.0, common)
-        found = fused_allan(of_board, equal(number), [30.0]).variance[0]
+        found = fused_allan(of_board, np.full(number, 1.0 / number), [30.0]).variance[0]
         assert bool(found <= wanted) == enough
 
 

@@ -6,12 +6,18 @@ from imubench_pipeline.allan.confidence import deviation_limits
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.fusion.board import Board, Shared
 from imubench_pipeline.extensions.fusion.prediction import fused_allan, prediction_limits
-from imubench_pipeline.extensions.fusion.weights import best_constant, equal, fuse
+from imubench_pipeline.extensions.fusion.weights import best_weights, fuse
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
 from tests.fusion.boards import FLICKER, ROUGH, SMOOTH, logs
 
 RATE = 100.0
+
+
+def equal(sensors: int) -> np.ndarray:
+    return np.full(sensors, 1.0 / sensors)
+
+
 TAU = np.array([0.01, 0.1, 1.0, 10.0, 100.0, 1000.0])
 TEMPERATURE = Shared(NoiseModel(N=0.02, K=0.01), [1e-4, -2e-4, 3e-4])
 BOARD = Board([SMOOTH, FLICKER, ROUGH], [RATE] * 3)
@@ -21,7 +27,7 @@ BOARD = Board([SMOOTH, FLICKER, ROUGH], [RATE] * 3)
 def test_n_alike_have_one_nth_of_the_allan_variance(number: int) -> None:
     board = Board.alike(FLICKER, number, RATE)
     expected = FLICKER.allan_variance(TAU, RATE) / number
-    for weights in (equal(number), best_constant(board, 10.0)):
+    for weights in (equal(number), best_weights(board, 10.0)):
         found = fused_allan(board, weights, TAU)
         assert found.variance == pytest.approx(expected, rel=1e-7)
         assert np.all(found.common == 0.0) and np.all(found.common_share == 0.0)
@@ -57,7 +63,7 @@ def test_the_prediction_lies_within_the_limits_of_simulated_curves(name: str) ->
     board = BOARDS[name]
     sizes = np.array([1, 3, 10, 30, 100, 300, 1000, 3000, 10_000])
     given = logs(board, 120_000, seed=11)
-    for weights in (equal(board.sensors), best_constant(board, 10.0)):
+    for weights in (equal(board.sensors), best_weights(board, 10.0)):
         curve = allan_variance(fuse(board, weights, given), board.rate, cluster_sizes=sizes)
         predicted = fused_allan(board, weights, curve.tau).deviation
         lower, upper = deviation_limits(curve.deviation, curve.edf, 0.9999)

@@ -83,7 +83,7 @@ def test_the_command_says_what_listing_took(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = ATTACKS["6 GB of comments"].write(tmp_path)
-    monkeypatch.setattr("imubench_pipeline.run.cli.INSPECTED_S", 0.001)
+    monkeypatch.setattr("imubench_pipeline.run.analysis.project.INSPECTED_S", 0.001)
     assert main(["inspect", str(path)]) == 2
     said = capsys.readouterr().err
     assert re.fullmatch(r"log.csv.gz: to list it took more than 0.001 s; expected .*\n", said)

@@ -1,10 +1,9 @@
 """Curves and estimates as rows of the tables, and estimates back from them."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
     for i, point in enumerate(make_curve_points(curve)):
         yield AllanRow(
             **asdict(key),
-            **point,
+            **vars(point),
             cluster_size=int(curve.cluster_size[i]),
             averaged=float(curve.averaged[i]),
             exponent=int(curve.exponent[i]),
@@ -36,13 +35,24 @@ def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
         )
 
 
-def make_curve_points(curve: AllanCurve) -> Iterator[dict[str, Any]]:
-    """Yield the points of a measured curve with 95 % limits: the columns that its tables share."""
-    names = ("tau", "adev", "lower", "upper", "edf", "edf_upper", "edf_source")
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of a measured curve: the columns that its tables share."""
+
+    tau: float
+    adev: float
+    lower: float
+    upper: float
+    edf: float
+    edf_upper: float
+    edf_source: str
+
+
+def make_curve_points(curve: AllanCurve) -> Iterator[CurvePoint]:
+    """Yield the points of a measured curve, with 95 % limits."""
     columns = curve.tau, curve.deviation, *curve.limits(0.95), curve.edf, curve.edf_upper
     numbers = (column.tolist() for column in columns)
-    for row in zip(*numbers, curve.edf_source, strict=True):
-        yield dict(zip(names, row, strict=True))
+    yield from (CurvePoint(*row) for row in zip(*numbers, curve.edf_source, strict=True))
 
 
 def make_parameter_rows(

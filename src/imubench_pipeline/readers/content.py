@@ -86,7 +86,6 @@ def _name_compression(begin: bytes) -> str:
 
 
 def _refuse_other_format(path: Path, begin: bytes) -> None:
-    """Raise `RecordingError` if a file is known from its first bytes, but not read."""
     for reader, marks in EXTENSION_MARKS.items():
         if begin.startswith(marks):
             _refuse_missing_extension(path, reader)

@@ -126,7 +126,6 @@ def _every_file(folder: Path) -> Iterator[Path]:
 
 
 def _why_skipped(file: Path, logs: Path) -> str:
-    """Return why a file of the drop zone belongs to no recording, by its name and place."""
     name, suffix = file.name, file.suffix.lower()
     if copy := next((part for part in file.relative_to(logs).parts if part.endswith("~")), ""):
         return texts.editor_backup(copy)
@@ -157,7 +156,6 @@ def _why_skipped(file: Path, logs: Path) -> str:
 
 
 def _logs_of(folder: Path) -> Iterator[Recording]:
-    """Yield the recordings in the folder of a sensor."""
     sensor = get_sensor_name(folder)
     try:
         shown = _shown(folder)
@@ -217,7 +215,6 @@ def _shown(folder: Path) -> list[Path]:
 
 
 def _is_log(path: Path) -> bool:
-    """Return whether a file of the drop zone is a log, by its name."""
     return path.suffix.lower() not in _NOT_LOGS
 
 
@@ -237,7 +234,6 @@ def _usable(name: str) -> str:
 
 
 def _fault(path: Path, name: str) -> str | None:
-    """Return why a file of the drop zone cannot be used, by its name or place."""
     shown = ascii(path.name)
     folder = path.parent.name
     for what, name_shown, stem in (("file", shown, name), ("folder", ascii(folder), folder)):

@@ -222,7 +222,6 @@ def _doubt(
     unfit: bool = False,
     **more: Any,
 ) -> DoubtRow:
-    """Return the row of the table ``doubts`` about a recording."""
     return DoubtRow(
         sensor=row.sensor,
         recording=row.recording,

@@ -236,7 +236,6 @@ def _ingest(
 
 
 def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
-    """Return a note on the unused files of a folder."""
     if not source.is_dir() or recognise_folder(source) is not None:
         return []
     used = {path for part in parts for path in (part.source.path, *part.source.path.parents)}
@@ -256,7 +255,6 @@ def _findings(
     *,
     static: bool,
 ) -> list[Finding]:
-    """Return the findings about the files, their columns and their clocks."""
     read_files = {id(part.source): part.source for part in parts}.values()
     findings = [finding for file in read_files for finding in file.findings]
     findings += [finding for file in read_files for finding in file.contradicted_units()]
@@ -310,7 +308,6 @@ def _findings(
 
 
 def _count_knocks(knocks: Iterable[Knock], span: Finding, rate: float) -> int:
-    """Return the number of knocks within a finding."""
     begin, end = (span.start or 0.0) * rate, (span.end or 0.0) * rate
     return sum(knock.first < end and knock.last > begin for knock in knocks)
 
@@ -328,7 +325,6 @@ def _find_holes(parts: list[Part], base: timebase.TimeBase) -> tuple[dict[str, b
 
 
 def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
-    """Return the rotation of gravity relative to the sensor; None if none is detected."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     place = {name: n for n, part in enumerate(parts) for name in part.columns if name in axes}
     used = set(place.values())

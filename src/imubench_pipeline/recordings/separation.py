@@ -58,7 +58,6 @@ class _Records:
         }
 
     def count(self, channel: str) -> int:
-        """Return the number of records in which a channel has a number."""
         return self.common[channel, channel]
 
     def times(self, *, numbered: bool = False) -> Iterator[Array]:

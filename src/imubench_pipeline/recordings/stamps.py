@@ -71,7 +71,6 @@ def estimate_interval(stamps: Stamps) -> Interval | None:
 
 
 def _sum_steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
-    """Return the sum of the steps up to a limit, s, and their number."""
     total, count = 0.0, 0
     for block in stamps():
         steps = _take_forward_steps(block)

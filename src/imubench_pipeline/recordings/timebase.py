@@ -207,7 +207,6 @@ def find_rate_changes(
 
 
 def _is_rate_of(stated: float | None, interval: float, settings: QualitySettings) -> bool:
-    """Return whether a stated rate agrees with an interval."""
     return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
 
 

@@ -41,7 +41,6 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
 
 
 def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
-    """Check a recording like a run, with its samples in a temporary folder."""
     key = recording.sensor, recording.name
     settings = plan.ingest_settings(*key)
     quality = ingest_as_planned(recording.path, settings, *key, folder, guarded=True)

@@ -184,30 +184,16 @@ def _check(options: argparse.Namespace) -> int:
     return worst
 
 
-INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # time and memory in which a log is listed
-
-
 def _inspect(options: argparse.Namespace) -> int:
-    from imubench_pipeline.readers.bounded import BoundError, run_bounded
-    from imubench_pipeline.readers.inspection import inspect
-    from imubench_pipeline.tables.findings import RecordingError
+    from imubench_pipeline.run.analysis.project import inspect_log
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
     output: outputs.OutputFile | None = options.output
-    try:
-        model = output.path.stem if output is not None else None
-        inspected = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
-        if output is not None:
-            output.write(inspected.block)
-    except BoundError as error:
-        raise command_line.CommandError(
-            f"{options.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
-            "what it measured into a file of its own"
-        ) from None
-    except (RecordingError, OSError) as error:
-        raise command_line.CommandError(str(error)) from None
+    inspected = inspect_log(options.log, model=output.path.stem if output is not None else None)
+    if output is not None:
+        output.write(inspected.block)
     if not options.block:
         print(inspected.listing)
     if output is None:

@@ -129,7 +129,6 @@ def read_note(path: Path) -> Mapping[str, Any]:
 
 
 def _describe_holder(note: Mapping[str, Any]) -> str:
-    """Describe the holder of a lock."""
     if not isinstance(process := note.get("process"), int):
         return "its owner is not known"
     since = f"since {note.get('since')}"

@@ -528,7 +528,6 @@ def _dump_for_samples(recording: simulations.SimulatedRecording) -> dict[str, An
 
 
 def _describe_board(board: simulations.Board) -> dict[str, object]:
-    """Return the description of a board for the report."""
     return {
         "title": board.title,
         "note": board.note,

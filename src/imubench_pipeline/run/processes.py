@@ -110,7 +110,6 @@ class Processes:
 def _request(
     connection: "Connection[Any, Any]", job: Job, seconds: float | None
 ) -> dict[str, float] | StepError:
-    """Return the cost of a step, or its error."""
     try:
         connection.send(job)
         if connection.recv() is None:  # it begins

@@ -179,7 +179,6 @@ def _check_depth(out: OutputFile) -> None:
 
 
 def _declared(name: str, stated: Path | None) -> Any:
-    """Return the sensor file of this name."""
     from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.sensor import Sensor
 
@@ -242,7 +241,6 @@ def _rate(text: str | None, log: Any) -> float:
 
 
 def _duration(text: str | None, hours: float | None, rate: float) -> float:
-    """Return the length of the log in s."""
     if text is not None:
         with add_key_to_errors("--duration: "):
             duration = parse_quantity(text, "time")
@@ -345,7 +343,6 @@ def _describe_aliasing(origin: "Origin", rate: float) -> list[str]:
 
 
 def _merge_lines(lines: list[str]) -> list[str]:
-    """Merge equal lines of several channels."""
     channels: dict[str, list[str]] = {}
     for line in lines:
         name, colon, rest = line.partition(": ")

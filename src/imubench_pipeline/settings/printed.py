@@ -187,7 +187,6 @@ class PrintedFigure(Strict):
 
 
 def _listed(value: Any) -> Any:
-    """Return a single figure as a list of one."""
     if isinstance(value, Mapping):
         return (PrintedFigure.model_validate(value),)
     listed = value if isinstance(value, (list, tuple)) else [value]

@@ -11,7 +11,7 @@ Nothing is computed here: every configuration loads this module.
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -20,47 +20,54 @@ from imubench_pipeline.settings.validation import Frequency, Strict, Text
 from imubench_pipeline.units import UnitError, add_key_to_errors, parse_difference, parse_quantity
 
 
-class ProcessSettings(Strict):
+class _Figures(Strict):
+    """Figures with units; ``{}`` in a dimension is the quantity, ``signal`` its own dimension."""
+
+    dimensions: ClassVar[Mapping[str, str]]
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the stated figures in SI, temperatures in degC; UnitError begins with the key.
+
+        ``channel``: a channel, or its quantity.
+        """
+        quantity, figures = quantity_of(channel), {}
+        for key, of in self.dimensions.items():
+            if (text := getattr(self, key)) is not None:
+                dimension = QUANTITIES[quantity] if of == "signal" else of.format(quantity)
+                with add_key_to_errors(f"{key}: "):
+                    figures[key] = parse_quantity(text, dimension)
+        return figures
+
+
+class ProcessSettings(_Figures):
     """A Gauss-Markov process."""
 
+    dimensions: ClassVar = {"B": "signal", "T_B": "time"}
     B: Text
     T_B: Text
 
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI."""
-        return _in_si({"B": (self.B, QUANTITIES[quantity]), "T_B": (self.T_B, "time")})
 
-
-class LineSettings(Strict):
+class LineSettings(_Figures):
     """A sinusoid."""
 
+    dimensions: ClassVar = {"amplitude": "signal", "frequency": "frequency"}
     amplitude: Text
     frequency: Frequency
 
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI."""
-        amplitude = (self.amplitude, QUANTITIES[quantity])
-        return _in_si({"amplitude": amplitude, "frequency": (self.frequency, "frequency")})
 
-
-class DriftSettings(Strict):
+class DriftSettings(_Figures):
     """The drift with temperature."""
 
+    dimensions: ClassVar = {
+        "sensitivity": "{}_temperature_coefficient",
+        "reference": "temperature",
+        "quadratic": "{}_temperature_curvature",
+        "lag": "time",
+    }
     sensitivity: Text
     reference: Text = "25 degC"
     quadratic: Text | None = None
     lag: Text = "0 s"
-
-    def si(self, quantity: str) -> dict[str, float]:
-        """Return its figures in SI, the reference in degC."""
-        return _in_si(
-            {
-                "sensitivity": (self.sensitivity, f"{quantity}_temperature_coefficient"),
-                "reference": (self.reference, "temperature"),
-                "quadratic": (self.quadratic, f"{quantity}_temperature_curvature"),
-                "lag": (self.lag, "time"),
-            }
-        )
 
 
 class LowPassSettings(Strict):
@@ -70,9 +77,18 @@ class LowPassSettings(Strict):
     order: int = Field(1, ge=1, le=10, description="above 1: Butterworth")
 
 
-class AxisSettings(Strict):
+class AxisSettings(_Figures):
     """One axis: its noise (N is two-sided, before the low-pass), and its other errors."""
 
+    dimensions: ClassVar = {
+        "N": "{}_density",
+        "B": "signal",
+        "T_B": "time",
+        "K": "{}_random_walk",
+        "R": "{}_ramp",
+        "Q": "{}_quantization",
+        **dict.fromkeys(("bias", "resolution", "full_scale"), "signal"),
+    }
     N: Text | None = Field(None, description="white noise density, two-sided")
     B: Text | None = Field(
         None, description="bias instability (the curve's peak is 0.664 B); without T_B: flicker"
@@ -96,36 +112,18 @@ class AxisSettings(Strict):
             raise ValueError("T_B is the correlation time of B, which is missing")
         return self
 
-    def si(self, channel: str) -> dict[str, float]:
-        """Return the figures of noise, bias, resolution and full scale in SI."""
-        quantity = quantity_of(channel)
-        plain = QUANTITIES[quantity]
-        dimensions = {
-            "N": f"{quantity}_density",
-            "B": plain,
-            "T_B": "time",
-            "K": f"{quantity}_random_walk",
-            "R": f"{quantity}_ramp",
-            "Q": f"{quantity}_quantization",
-            "bias": plain,
-            "resolution": plain,
-            "full_scale": plain,
-        }
-        return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
-
     def check(self, channel: str) -> None:
         """Raise UnitError, with the key, if a unit has the wrong dimension for its figure."""
-        quantity = quantity_of(channel)
         self.si(channel)
         for number, process in enumerate(self.further):
             with add_key_to_errors(f"further.{number}."):
-                process.si(quantity)
+                process.si(channel)
         for number, line in enumerate(self.sinusoids):
             with add_key_to_errors(f"sinusoids.{number}."):
-                line.si(quantity)
+                line.si(channel)
         if self.drift is not None:
             with add_key_to_errors("drift."):
-                self.drift.si(quantity)
+                self.drift.si(channel)
 
 
 def _matrix(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
@@ -175,13 +173,3 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
             axis.check(channel)
         except UnitError as error:
             raise ValueError(f"{key}.{channel}.{error}") from error
-
-
-def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
-    """Return the stated figures in SI, from text and dimension by key."""
-    in_si = {}
-    for key, (text, dimension) in figures.items():
-        if text is not None:
-            with add_key_to_errors(f"{key}: "):
-                in_si[key] = parse_quantity(text, dimension)
-    return in_si

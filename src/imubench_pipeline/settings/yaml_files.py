@@ -69,7 +69,6 @@ class _Loader(_SAFE):
         return number
 
     def construct_decimal(self, node: yaml.ScalarNode) -> Decimal:
-        """Return a number with decimals."""
         number = Decimal(self.construct_yaml_float(node))
         number.written = node.value
         return number

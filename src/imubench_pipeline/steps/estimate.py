@@ -222,7 +222,7 @@ class _Channel:
                 points = rows.make_curve_points(limited(left, without))
                 for point, effect in zip(points, added.deviation, strict=True):
                     row = model.CompensatedAllanRow(
-                        **asdict(key), **point, temperature=float(effect)
+                        **asdict(key), **vars(point), temperature=float(effect)
                     )
                     into.allan_compensated.append(row)
         return estimates

@@ -153,14 +153,8 @@ class Blocks(SampleBlocks):
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Blocks":
         """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
-        return replace(
-            self,
-            start=self.start[which],
-            stop=self.stop[which],
-            count=self.count[which],
-            sense=self.sense[which],
-            dwell=self.dwell[which],
-        )
+        arrays = ("start", "stop", "count", "sense", "dwell")
+        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def of_dwells(self) -> "Blocks":
         """Return one block per dwell, from the first sample of its blocks to the last."""
@@ -184,7 +178,6 @@ class Measured:
     means: Array  # shape (1, b); rad/s, a row for the one log
     missing: int  # samples within dwells that are missing (NaN)
     left_out: int  # samples present in blocks with too few
-    turning: int  # samples of the log, present or not, outside of dwells
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
@@ -219,7 +212,6 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         (total[enough] / count[enough])[None, :],
         int((whole.count - count).sum()),
         int(count[~enough].sum()),
-        length - experiment.samples_in_dwells,
     )
 
 

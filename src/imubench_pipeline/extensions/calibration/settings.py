@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -181,13 +181,27 @@ class OnRateTable(Experiment):
         return stated_gyro(self.channel, channels, "is along the axis of the table")
 
 
-class InPositions(Experiment):
+class Turned(Experiment):
+    """A log of a sensor that is turned by a schedule, and is at rest between the turns."""
+
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    dwell: Time = Field(
+        description="nominal time from the start of one turn to the start of the next"
+    )
+
+    def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
+        """Return one of its time settings, s."""
+        return parse_quantity(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """Latitude, rad."""
+        return parse_quantity(self.latitude, "angle")
+
+
+class InPositions(Turned):
     """A triad that is turned about its z axis by a schedule, and is at rest between the turns."""
 
-    latitude: Latitude = Field(
-        description="latitude of the place, with its unit; south is negative"
-    )
-    dwell: Time = Field(description="from the start of one turn to the start of the next")
     turning: TimeFromZero = Field(
         "2 s", description="part of this time, at its end, that the turn takes"
     )
@@ -208,15 +222,6 @@ class InPositions(Experiment):
                 f"turning is {self.turning}; expected less than the dwell, {self.dwell}"
             )
         return self
-
-    def seconds(self, name: str) -> float:
-        """Return one of its time settings, s."""
-        return parse_quantity(getattr(self, name), "time")
-
-    @property
-    def latitude_si(self) -> float:
-        """The latitude, rad."""
-        return parse_quantity(self.latitude, "angle")
 
     def angle(self, number: int) -> float:
         """Return the angle of a position, from 0, to the first, rad; it grows from turn to turn."""

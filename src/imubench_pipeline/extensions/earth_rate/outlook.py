@@ -298,7 +298,7 @@ def _predict_alignment(
             error_roll=of_roll,
             error_pitch=of_pitch,
             error_heading=of_heading,
-            simulated=None if accuracy.errors is None else accuracy.simulated,
+            simulated=None if accuracy.errors is None else _SIMULATED_TRIADS,
             latitude=site.latitude,
             gyro_bias=gyro_bias,
             gyro_bias_from=gyro_words,

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from imubench_pipeline.extensions.calibration.settings import stated_gyro
-from imubench_pipeline.settings.experiments import Experiment, Gyro
+from imubench_pipeline.extensions.calibration.settings import Turned, stated_gyro
+from imubench_pipeline.settings.experiments import Gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.validation import (
     AccelerationFromZero,
@@ -26,13 +26,9 @@ _REQUIRED_KEYS = {
 }
 
 
-class TwoPosition(Experiment):
+class TwoPosition(Turned):
     """A log of a gyro that was repeatedly turned end for end, between north and south."""
 
-    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
-    dwell: Time = Field(
-        description="nominal time from the start of one turn to the start of the next"
-    )
     channel: Gyro | None = Field(None, description="the turned gyro; null: the only one of the log")
     turning: TimeFromZero = Field("2 s", description="duration of a turn that is not visible")
     start: TimeFromZero = Field("0 s", description="of the first dwell, from the first sample used")
@@ -74,15 +70,6 @@ class TwoPosition(Experiment):
                 f"turning is {self.turning}; expected less than half of the dwell of {self.dwell}"
             )
         return self
-
-    def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
-        """Return one of its time settings, s."""
-        return parse_quantity(getattr(self, name), "time")
-
-    @property
-    def latitude_si(self) -> float:
-        """Latitude, rad."""
-        return parse_quantity(self.latitude, "angle")
 
     @property
     def first_sense(self) -> int | None:

@@ -107,6 +107,14 @@ class Board:
             len(self.shared), self.sensors
         )
 
+    def check_weights(self, weights: Array) -> None:
+        """Raise ValueError unless the weights are one for each sensor, with the sum 1.
+
+        Then the common signal passes unchanged.
+        """
+        if weights.shape != (self.sensors,) or not abs(weights.sum() - 1.0) <= 1e-9:
+            raise ValueError("expected a weight for each sensor, with a sum of 1")
+
     def allan_parts(self, tau: ArrayLike) -> Parts:
         """Return the Allan variances of the sensors at whole samples next to tau, s, shape (m,)."""
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.extensions.fusion.board import Board
-from imubench_pipeline.extensions.fusion.weights import Constant
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -34,20 +33,22 @@ class FusedCurve:
         )
 
 
-def fused_allan(board: Board, weights: Constant, tau: ArrayLike) -> FusedCurve:
+def fused_allan(board: Board, weights: Array, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
     It is the sum of w_i^2 AV_i and, of each shared process, of (w^T g)^2 AV. The tau are array_like
-    of shape (m,), s, rounded to whole fused samples, at least one.
+    of shape (m,), s, rounded to whole fused samples, at least one. The weights have the shape (n,)
+    and the sum 1, or ValueError.
     """
-    alone, common = board.allan_parts(tau).of_sum(weights.values)
+    board.check_weights(weights)
+    alone, common = board.allan_parts(tau).of_sum(weights)
     return FusedCurve(alone + common, common)
 
 
 def prediction_limits(
     board: Board,
     estimates: Sequence[Estimate],
-    weights: Constant,
+    weights: Array,
     tau: ArrayLike,
     *,
     draws: int,

@@ -1,7 +1,7 @@
 """Specimens of one sensor on a board, fused to one log: the aim of Engers (2021, section 1).
 
 The noise of each specimen is independent, and its N, B and K scatter. The weights minimise the
-white noise (N^-2, `weights.best_constant`). T_B and the low-pass are the same for all specimens,
+white noise (N^-2, `weights.best_weights`). T_B and the low-pass are the same for all specimens,
 and for the fused log.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from imubench_pipeline.extensions.fusion.board import Board
 from imubench_pipeline.extensions.fusion.settings import Specimens
-from imubench_pipeline.extensions.fusion.weights import Constant, best_constant, fuse
+from imubench_pipeline.extensions.fusion.weights import best_weights, fuse
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import TEMPERATURE
@@ -44,16 +44,16 @@ def make_specimens(recording: SimulatedRecording) -> list[ImuModel]:
     return made
 
 
-def make_board(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Constant]:
+def make_board(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Array]:
     """Return the board of noise models at one rate, Hz, and the weights that fuse them."""
     board = Board(list(models), [rate] * len(models))
-    return board, best_constant(board)
+    return board, best_weights(board)
 
 
-def fuse_models(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
+def fuse_models(models: Sequence[NoiseModel], weights: Array) -> NoiseModel:
     """Return the noise of fused specimens with equal correlation times: roots of sum w^2 p^2."""
     ratios = [
-        np.linalg.norm(weights.values * [getattr(model, name) for model in models])
+        np.linalg.norm(weights * [getattr(model, name) for model in models])
         / (getattr(models[0], name) or 1.0)
         for name in _SPREAD_PARAMETERS
     ]

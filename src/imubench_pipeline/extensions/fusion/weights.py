@@ -1,7 +1,6 @@
-"""Constant weights of the sensors of a board in one virtual sensor, and its samples."""
+"""Weights of the sensors of a board in one virtual sensor, and its samples."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,26 +11,8 @@ _BLOCK_LENGTH = 1 << 16  # of a product, in samples: its rounding depends on the
 _MIN_VARIANCE_RATIO = 1e-14  # of a sensor without noise, over the noisiest one
 
 
-@dataclass(frozen=True)
-class Constant:
-    """Weights of sensors; ValueError if their sum is not 1."""
-
-    values: Array  # shape (n,); their sum is 1, so that the common signal passes unchanged
-
-    def __post_init__(self) -> None:
-        if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:
-            raise ValueError("expected a weight for each sensor, with a sum of 1")
-
-
-def equal(sensors: int) -> Constant:
-    """Return equal weights for a number of sensors; raise a ValueError below 1."""
-    if sensors < 1:
-        raise ValueError(f"found {sensors} sensors, expected at least one")
-    return Constant(np.full(sensors, 1.0 / sensors))
-
-
-def best_constant(board: Board, tau: float | None = None) -> Constant:
-    """Return the constant weights of least Allan variance at a tau, s, by default N^-2.
+def best_weights(board: Board, tau: float | None = None) -> Array:
+    """Return the weights, shape (n,), of least Allan variance at a tau, s, by default N^-2.
 
     With common parts, a weight may be negative: a sensor of large sensitivity compensates the
     others. The tau is rounded to whole fused samples. Raises ValueError for a sensor without noise.
@@ -44,7 +25,7 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
         parts = board.allan_parts([tau])
     if not np.all(parts.own + parts.shared @ parts.sensitivities**2 > 0.0):
         raise ValueError("a sensor without noise cannot be weighted by its noise")
-    return Constant(least(parts)[0])
+    return np.asarray(least(parts)[0])
 
 
 def least(parts: Parts) -> Array:
@@ -91,9 +72,13 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     return fused
 
 
-def fuse(board: Board, weights: Constant, samples: Sequence[Array]) -> Array:
-    """Return the samples of the virtual sensor, shape (k,), of samples as of `at_fused_rate`."""
+def fuse(board: Board, weights: Array, samples: Sequence[Array]) -> Array:
+    """Return the samples of the virtual sensor, shape (k,), of samples as of `at_fused_rate`.
+
+    The weights have the shape (n,) and the sum 1, or ValueError.
+    """
+    board.check_weights(weights)
     fused = at_fused_rate(board, samples)
     blocks = range(0, len(fused), _BLOCK_LENGTH)
-    sums = [fused[start : start + _BLOCK_LENGTH] @ weights.values for start in blocks]
+    sums = [fused[start : start + _BLOCK_LENGTH] @ weights for start in blocks]
     return np.concatenate([*sums, np.empty(0)])

@@ -276,13 +276,11 @@ def _find_column(
 
 
 def _make_address(column: str, variable: str | None) -> str:
-    """Return the path of a vector or a field in the file."""
     parts = [column] if variable is None else [variable, column]
     return "/".join(part.strip("/") for part in parts)
 
 
 def _find_addressed(tables: dict[str, Table], column: str, variable: str | None) -> list[_Place]:
-    """Return the named columns that match an address."""
     address = _make_address(column, variable)
     return [
         (table, position)
@@ -294,7 +292,6 @@ def _find_addressed(tables: dict[str, Table], column: str, variable: str | None)
 
 
 def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Table:
-    """Return the array with a name, or the only array."""
     if variable is not None:
         name = variable.strip("/")
         if name and name in tables:
@@ -467,7 +464,6 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
 
 
 def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
-    """Return the first records of some columns, by position."""
     if not places:
         return {}
     rows = min(MAX_EXAMINED_RECORDS, count_block_rows(table.row_bytes(places), _MAX_EXAMINED_BYTES))

@@ -187,7 +187,6 @@ class _Elements:
         return length
 
     def data(self, *kinds: int) -> bytes:
-        """Return the data of the next element."""
         begin = self.at
         length = self.tag(*kinds)
         if length > _MAX_ELEMENT_HEADER:

@@ -100,7 +100,6 @@ def group_columns(contents: Contents) -> list[Group]:
 
 
 def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
-    """Return the groups that are recognised by the names of their columns."""
     # The most specific name of the table or its file that contains a quantity.
     file = PurePosixPath(table.file or contents.path.name)
     titles = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
@@ -173,7 +172,6 @@ def _make_group(
 
 
 def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
-    """Yield the rates with the names p, q and r, if there is no other gyro."""
     if any(group.quantity == "gyro" for group in named):
         return
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
@@ -227,9 +225,7 @@ _QUANTITY_NAMES = {"gyro": "gyro", "accel": "accelerometer", "temperature": "tem
 class Choice:
     """The columns of a log that are used, and the others."""
 
-    gyro: Group | None
-    accel: Group | None
-    temperature: Group | None
+    groups: list[Group]  # gyro, accelerometer and temperature, as far as there are any
     clock: Clock | None
     local: bool  # the time column is in the table of the channels, in each file
     anchor: LogTable | None  # the table whose records or clock all others must share
@@ -252,7 +248,6 @@ def choose_columns(contents: Contents) -> Choice:
     in_groups = {id(column) for group in recognised for column in group.columns.values()}
 
     def find_table_clocks(table: LogTable) -> list[Clock]:
-        """Return the columns that may be the time of a table, the most plausible first."""
         columns = list(table.columns)
         if table.file_format.clock_of == "length":
             for other in contents.tables:
@@ -294,9 +289,7 @@ def choose_columns(contents: Contents) -> Choice:
     left += [(g, f"another {_QUANTITY_NAMES[g.quantity]}") for g in fitting if g not in selected]
     spoken = in_groups | {id(other.column) for other in ours}
     return Choice(
-        gyro,
-        accel,
-        temperature,
+        selected,
         clock,
         _is_local(selected, clock),
         anchor,
@@ -419,13 +412,10 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
         table = choice.anchor or next(stating, None)
         if table is not None and table.rate is not None:
             drafted.rate = Entry(f"{table.rate:.10g} Hz", "stated in the file")
-    selected = (choice.gyro, choice.accel, choice.temperature)
-    alone = {group.table.file for group in selected if group is not None} == {contents.only}
-    for group in (choice.gyro, choice.accel):
-        if group is not None:
-            _add_group(drafted, group, alone)
-    if choice.temperature is not None:
-        _add_temperature(drafted, choice.temperature, alone)
+    alone = {group.table.file for group in choice.groups} == {contents.only}
+    for group in choice.groups:
+        add = _add_temperature if group.quantity == "temperature" else _add_group
+        add(drafted, group, alone)
     if not drafted.channels:
         several = sum(table.variable is not None for table in contents.tables) > 1
         source = Source(variable=UNKNOWN if several else None, column=UNKNOWN, unit=UNKNOWN)
@@ -446,11 +436,10 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
 
 def _list_unused_tables(contents: Contents, choice: Choice) -> list[str]:
     """Return remarks on the arrays, topics and files of which no column is mentioned otherwise."""
-    groups = [choice.gyro, choice.accel, choice.temperature, *(group for group, _ in choice.left)]
-    used = {id(group.table) for group in groups if group is not None}
-    used |= {id(choice.anchor)} if choice.anchor else set()
-    clocks = [*([choice.clock] if choice.clock else []), *choice.other_clocks]
-    of_time = {id(clock.column) for clock in clocks}
+    groups = [*choice.groups, *(group for group, _ in choice.left)]
+    used = {id(choice.anchor), *(id(group.table) for group in groups)}
+    clocks = [choice.clock, *choice.other_clocks]
+    of_time = {id(clock.column) for clock in clocks if clock is not None}
     by_reason: dict[str, list[str]] = {}
     for table in contents.tables:
         if id(table) in used or of_time & set(map(id, table.columns)):
@@ -507,7 +496,6 @@ def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
 
 
 def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
-    """Add the temperature to a draft, unless its unit is unknown."""
     (column,) = list(group.columns.values())[:1]
     unit, comment = group.unit, ""
     present = column.values[np.isfinite(column.values)]

@@ -124,7 +124,6 @@ def _interpret_name(name: str) -> Meaning | None:
 
 
 def _interpret_by_unit(quantity: Quantity, name: str, unit: str) -> Meaning | None:
-    """Return the meaning of a name with a unit that determines the quantity."""
     words = split_label(name)
     axis, rest, _ = _find_axis(words)
     joined = "".join(rest)

@@ -89,7 +89,6 @@ class CsvFile(LogFile):
     def _batches(
         self, layout: TextLayout, columns: Mapping[str, int], time: text_stamps.TextTime | None
     ) -> Iterator[Batch]:
-        """Yield all records, with stamps converted by ``time``."""
         records = layout.records()
         rows = 0
         parts = self._parts(layout, set(columns.values()), time, records)
@@ -213,7 +212,6 @@ class CsvFile(LogFile):
         layout: TextLayout,
         time: text_stamps.TextTime | None,
     ) -> RecordingError:
-        """Convert an error of pyarrow to an error about a line of the file."""
         text = str(error)
         row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
         if fault.row is not None and (row is None or fault.row.number <= int(row[1])):

@@ -153,7 +153,6 @@ class _Search:
         return labels
 
     def layout(self) -> TextLayout:
-        """Return the most plausible layout."""
         if self._lines:
             refuse_other_formats(self._file, self._lines[0].raw)
             begin = b"\n".join(line.raw for line in self._lines[:_SCORED_LINES])
@@ -212,7 +211,6 @@ class _Search:
         return tuple(sign for sign in _COMMENT_SIGNS if sign != delimiter)
 
     def _head(self, path: Path) -> tuple[list[_Line], list[_Line]]:
-        """Return the comments and the other lines of the beginning of a file."""
         comments: deque[_Line] = deque()
         lines: list[_Line] = []
         number, start, line_bytes, comment_bytes = 0, 0, 0, 0
@@ -263,7 +261,6 @@ class _Search:
         return self._comments + comments, lines
 
     def _splits(self) -> Sequence[Split]:
-        """Return the candidate rules for splitting lines."""
         stated = "," if self._labels is not None else self._log.delimiter
         if stated is not None:
             return [split for split in _CANDIDATE_SPLITS if split.delimiter == stated] or [
@@ -298,7 +295,6 @@ class _Search:
         return (shown, fits, width > 1, round(alike, 2))
 
     def _may_have_names(self, line: _Line) -> bool:
-        """Return whether a line contains a required name, with any delimiter."""
         return self._any_name.search(line.text.replace('"', "")) is not None
 
     def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:

@@ -168,7 +168,6 @@ _FIELD_OR_WORD = re.compile(r"%\w|[^\W_]+")
 
 
 def _group_forms_by_signs() -> dict[str, list[str]]:
-    """Return the patterns, grouped by the signs between their fields."""
     patterns: dict[str, list[str]] = {}
     whole = (
         date + sign + time

@@ -133,7 +133,6 @@ def detect_register_step(pieces: Sequence[Excerpt]) -> tuple[float, float] | Non
 def _has_different_steps(
     first: tuple[float, float] | None, other: tuple[float, float] | None
 ) -> bool:
-    """Return whether two registers have different steps."""
     if first is None or other is None:
         return False
     (fine, _), (coarse, seen) = sorted((first, other))

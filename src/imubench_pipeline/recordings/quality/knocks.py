@@ -92,7 +92,6 @@ def find_knocks(
 
 
 def _split_into_blocks(pieces: Iterable[Array], size: int) -> Iterator[Array]:
-    """Split a column into blocks of ``size`` records."""
     rest = np.empty(0)
     for piece in pieces:
         joined = np.concatenate((rest, piece)) if len(rest) else piece

@@ -223,7 +223,6 @@ def is_truncated(column: ColumnSummary, step: float) -> bool:
 
 
 def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
-    """Return the distinct values in the excerpts of a column, and their counts."""
     pieces = [piece.present for piece in column.excerpts()]
     return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 

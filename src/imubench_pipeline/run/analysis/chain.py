@@ -204,5 +204,4 @@ class Analysis:
 
 
 def _collect_results(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
-    """Wait for a step; return its results without None."""
     return {key: value for key, done in begun.items() if (value := done.result()) is not None}

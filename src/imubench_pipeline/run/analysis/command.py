@@ -173,7 +173,6 @@ def say(text: str) -> None:
 
 
 def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.Namespace) -> None:
-    """Write the page, the figures and the tables."""
     from imubench_pipeline.report.command import list_drawings
     from imubench_pipeline.report.publish import make_site, render_one_file
     from imubench_pipeline.tables.files import write_arrow, write_content

@@ -180,19 +180,17 @@ def _is_same_unit(unit: str, other: str, channel: str) -> bool:
         raise ConfigError(str(error)) from None
 
 
-def inspect_log(log: Path, topics: Sequence[str] = ()) -> Inspection:
+def inspect_log(log: Path, topics: Sequence[str] = (), model: str | None = None) -> Inspection:
     """Return what a log holds, within bounds of time and memory; ConfigError if it cannot be read.
 
-    ``topics`` of a bag; none: all.
+    ``topics`` of a bag; none: all. ``model``: name of the sensor; None: the name of the log.
     """
     try:
-        inspected: Inspection = run_bounded(
-            INSPECTED_S, INSPECTED_BYTES, inspect, log, None, topics
-        )
+        return run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log, model, topics)
     except BoundError as error:
         raise ConfigError(
-            f"{log}: to look into it {error}; expected the log of an inertial sensor"
+            f"{log.name}: to list it {error}; expected the log of an inertial sensor: copy what it "
+            "measured into a file of its own"
         ) from None
     except (RecordingError, OSError) as error:
         raise ConfigError(str(error)) from None
-    return inspected

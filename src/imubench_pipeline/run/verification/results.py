@@ -128,7 +128,6 @@ class Results:
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
     def _changed(self, place: str, seal: sealing.Seal) -> Iterator[Fault]:
-        """Yield the changed outputs of a step."""
         left = any(os.path.lexists(self.folder / name) for name in seal.outputs)
         last = place in (f"{sealing.NIGHTS}/latest", f"{sealing.NIGHTS}/state")
         if not (left or last or place in self._current):
@@ -139,7 +138,6 @@ class Results:
             self.read(file.size)
 
     def _samples(self, path: Path) -> Iterator[Fault]:
-        """Yield the changed samples of a recording."""
         place = path.parent.relative_to(self.folder).as_posix()
         step, name = f"{place}/ingest", f"{place}/{path.name}"
         try:

@@ -79,7 +79,6 @@ class Accuracy:
     time: float  # s
     sigma: Array  # shape (3,); of roll, pitch and heading, rad
     errors: Array | None = None  # shape (3,); rms of simulated errors over ``sigma``
-    simulated: int = 0  # number of simulated triads
 
     @property
     def reason(self) -> str | None:
@@ -139,6 +138,4 @@ def accuracies(
                     errors = np.sqrt(np.mean(fine.run(drawn).psi[:, -1] ** 2, axis=0)) / sigma
                     known = [True, True, sigma[2] < UNIFORM_HEADING_SIGMA]
                     errors = np.where(known, errors, math.nan)
-            yield Accuracy(
-                number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
-            )
+            yield Accuracy(number, "fine", time, fine.sigma[-1], errors)
