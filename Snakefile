@@ -51,7 +51,7 @@ onsuccess:
     if bucket:
         read = [f"tables/{name}.parquet" for name in (*SUMMARISED_TABLES, "files")]
         bucket.fetch("report/index.html", *read)
-    logger.info(summarise_run(plan.run.results, plan.run.logs), extra=OURS)
+    logger.info(summarise_run(plan.run.results), extra=OURS)
     incomplete = [plan.faults.left_out(), list_failed_pages(plan.run.results)]
     if any(incomplete):
         raise WorkflowError("\n".join(filter(None, incomplete)))

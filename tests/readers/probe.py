@@ -17,7 +17,7 @@ from imubench_pipeline.readers.bounded import BoundError, limit_memory, run_boun
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.recordings.availability import check_opening
-from imubench_pipeline.run.cli import INSPECTED_BYTES, INSPECTED_S
+from imubench_pipeline.run.analysis.project import INSPECTED_BYTES, INSPECTED_S
 from imubench_pipeline.settings.config import LimitSettings
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat

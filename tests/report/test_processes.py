@@ -13,14 +13,14 @@ def _describe(place: int) -> tuple[int, int]:
 
 
 def test_results_are_in_order_and_of_other_processes() -> None:
-    made = list(compute_in_order(_describe, 50, [49, 3], 2))
+    made = list(compute_in_order(_describe, 50, 2))
     assert [square for square, _ in made] == [place * place for place in range(50)]
     if sys.platform == "linux":
         assert {process for _, process in made}.isdisjoint({os.getpid()})
 
 
 def test_short_lists_need_no_other_process() -> None:
-    assert {process for _, process in compute_in_order(_describe, 5, [], 2)} == {os.getpid()}
+    assert {process for _, process in compute_in_order(_describe, 5, 2)} == {os.getpid()}
 
 
 def _fail(place: int) -> int:
@@ -31,7 +31,7 @@ def _fail(place: int) -> int:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_error_stops_the_list_where_it_occurs(processes: int) -> None:
-    made = compute_in_order(_fail, 50, [49], processes)
+    made = compute_in_order(_fail, 50, processes)
     assert [next(made) for _ in range(30)] == list(range(30))
     with pytest.raises(OSError, match="No space left"):
         next(made)

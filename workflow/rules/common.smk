@@ -112,7 +112,7 @@ def say_if_idle():
     )
     if is_run and not len(workflow.dag):
         remove_samples()
-        for line in describe_drop_zone(plan.run.results, plan.run.logs):
+        for line in describe_drop_zone(plan.run.results):
             print(line, file=sys.stderr)
 
 

@@ -27,7 +27,7 @@ rule sensor_tables:
     params:
         recordings=lambda w: [folder.rsplit("/", 1)[1] for folder in FOLDERS[w.sensor]],
         truths=lambda w: plan.truths(w.sensor),
-        sensor=lambda w: plan.sensor_file(w.sensor, "price_class", "sold"),
+        sensor=lambda w: plan.catalogue("price_class", "sold", sensor=w.sensor),
         usual=plan.usual,
         decide=plan.settings("decide"),
         code=plan.code("sensor_tables"),

@@ -170,28 +170,6 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
     return replace(now, version=before.version) if now.sha256 == before.sha256 else None
 
 
-def is_changed(source: Path, folder: Path) -> bool:
-    """Return whether a log has changed since its results in ``folder``; False without any."""
-    if (known := read_known(folder)) is None:
-        return False
-    try:
-        places = _places(source)
-    except OSError:
-        return True
-    if known.keys() != places.keys():
-        return True
-    for name, path in places.items():
-        before = known[name]
-        try:
-            uncertain = before.stamps is None and before.size == path.stat().st_size
-            if _now(path, before) is None and not uncertain:
-                return True
-        except OSError:
-            if before.size is not None:
-                return True
-    return False
-
-
 def plan_recording_versions(recording: Recording, results: Path) -> dict[str, str]:
     """Return `plan_versions` of a recording; empty for a simulated one."""
     if recording.simulated:

@@ -129,7 +129,6 @@ def _convert_to_figure(row: CatalogueRow, value: float) -> float:
 
 
 def _describe_source(row: CatalogueRow) -> str:
-    """Return a figure as printed, with its condition and place."""
     secondary = "secondary source" * (row.source == "secondary")
     parts = (row.as_printed or row.state, row.condition, row.place, secondary)
     return f"{row.figure.replace('_', ' ')}: {'; '.join(filter(None, parts))}"
@@ -144,7 +143,6 @@ def format_counts(published: Iterable[str]) -> str:
 
 
 def _make_share(rows: Sequence[CoverageRow]) -> Json:
-    """Return the share of published figures among those looked up."""
     published = sum(row.published in _PUBLISHED for row in rows)
     whole = sum(row.published != "not looked up" for row in rows)
     share = published / whole if whole else None
@@ -189,8 +187,5 @@ DATASHEETS = Entry(
     file="datasheets.html",
     title="Datasheets",
     context=_make_context,
-    tables=("catalogue", "coverage"),
     exists=lambda site: bool(site.rows(CoverageRow)),
-    views=lambda site: site.views,
 )
-"""The page of all comparisons with datasheets, and of the figures that vendors publish."""

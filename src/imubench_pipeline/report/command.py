@@ -80,7 +80,6 @@ def list_drawings(
 
 
 def _write(site: "Site", arguments: argparse.Namespace) -> None:
-    """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import publish, remove_old_pages, render_one_file
     from imubench_pipeline.tables.seals import seal_again
 

@@ -28,25 +28,23 @@ from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import duration_text, number_text
 
-KEPT = ("error_growth", "drawn_deviations")
-"""The tables of each recording that the page uses, besides the joined tables."""
-
 _SOURCE_COLUMNS = tuple(field.name for field in fields(ErrorSource))
 _COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
-    views = _select_recordings(site)
+    # The static recordings can be compared; of many, the latest.
+    views = site.select_compared([view for view in site.views if view.static])
     together = Comparison(site.compared(views), site.names)
     arrays, channels = together.arrays, together.channels
     recordings = []
     for view in views:
-        kept = {table: _read_columns(_make_path(site, view, table)) for table in KEPT}
-        drawn = dict(_pack_draws(kept["drawn_deviations"], arrays))
+        folder = site.results / "recordings" / view.sensor / view.name
+        drawn = dict(_pack_draws(_read_columns(folder / "drawn_deviations.parquet"), arrays))
         for channel in channels:
             if (channel["sensor"], channel["recording"]) == view.full_name:
                 channel["drawn"] = drawn.get(channel["channel"])
-        growth = _pack_growth(kept["error_growth"], arrays)
+        growth = _pack_growth(_read_columns(folder / "error_growth.parquet"), arrays)
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
@@ -91,19 +89,9 @@ def _make_context(site: Site) -> Mapping[str, object]:
 
 
 def _describe_verdict(row: RankingRow) -> str:
-    """Return the verdict of a row of ``ranking`` with its margins: in use, and others."""
     margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
     margins.append(verdicts.other_margins_text(row))
     return ", ".join(filter(None, [verdicts.SHORT_VERDICTS[row.verdict], *margins]))
-
-
-def _select_recordings(site: Site) -> list[RecordingView]:
-    """Return the static recordings, which can be compared; of many, the latest."""
-    return site.select_compared([view for view in site.views if view.static])
-
-
-def _make_path(site: Site, view: RecordingView, table: str) -> Path:
-    return site.results / "recordings" / view.sensor / view.name / f"{table}.parquet"
 
 
 def _read_columns(path: Path) -> Mapping[str, Any]:
@@ -175,7 +163,6 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays) -> Json | None:
 
 
 def _number_sources(kept: Mapping[str, Any]) -> Any:
-    """Return a number for the source of each row."""
     numbers = np.zeros(len(kept["source"]), dtype=np.intp)
     for name in _SOURCE_COLUMNS:
         codes, values = pd.factorize(kept[name], use_na_sentinel=False)
@@ -233,11 +220,5 @@ COMPARE = Entry(
     file="compare.html",
     title="Side by side",
     context=_make_context,
-    tables=("ranking",),
-    views=_select_recordings,
-    files=lambda site: (
-        _make_path(site, view, table) for view in _select_recordings(site) for table in KEPT
-    ),
     exists=lambda site: any(view.static for view in site.views),
 )
-"""The page that compares two or more sensors or recordings that the reader chooses."""

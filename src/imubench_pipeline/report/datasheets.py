@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from statistics import median
 
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
@@ -9,6 +10,7 @@ from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_page_unit, format_printed
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
 _STATISTIC_NAMES = dict.fromkeys(("adev_minimum", "plateau"), "bias instability")
@@ -66,11 +68,9 @@ _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
 
 def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
     """Return the interpretations of each printed figure."""
-    figures: dict[_Figure, list[DatasheetRow]] = {}
-    for row in rows:
-        name = (row.channel, row.quantity, row.printed, row.unit, row.kind, row.condition)
-        figures.setdefault(name, []).append(row)
-    return figures
+    return group_rows(
+        rows, lambda r: (r.channel, r.quantity, r.printed, r.unit, r.kind, r.condition)
+    )
 
 
 def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
@@ -110,9 +110,7 @@ def compare_sensors_with_datasheets(
         first = group[0][0]
         unit = choose_page_unit(quantity_of(channel), UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(merge_verdicts(rows)[0] for rows in group)
-        by_reading: dict[str, list[DatasheetRow]] = {}
-        for row in (row for rows in group for row in rows):
-            by_reading.setdefault(_name_reading(row), []).append(row)
+        by_reading = group_rows(chain(*group), _name_reading)
         readings: list[dict[str, str]] = []
         for name, rows in by_reading.items():
             measured = sorted(row.measured for row in rows if row.measured is not None)

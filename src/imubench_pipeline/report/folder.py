@@ -7,7 +7,6 @@ from pathlib import Path
 from imubench_pipeline.tables.files import write_content
 
 KEYS = "pages.json"
-"""File with the digests of the pages."""
 
 _FAILED_PAGES_FILE = "failed_pages.json"
 

@@ -179,7 +179,6 @@ def render_log_screen(
 
 
 def _fold(text: str, width: int, lines: int, indent: str = "") -> str:
-    """Return a text in at most so many lines."""
     text = run_summary.fold_text(text, 1000)
     return "\n".join(wrap(text, width, subsequent_indent=indent, max_lines=lines, placeholder=" …"))
 
@@ -224,7 +223,6 @@ def _line(name: str, cells: Iterable[str]) -> str:
 
 
 def _cell(row: ParameterRow | None, unit: Unit, *, doubted: bool) -> tuple[str, str]:
-    """Return a value, or a bound, and the interval."""
     if row is None:
         return NO_VALUE, ""
     value, interval = unit.estimate_texts(row.value, row.lower, row.upper)

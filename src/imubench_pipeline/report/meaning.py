@@ -13,6 +13,7 @@ from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers, verdicts
 
 
@@ -55,11 +56,6 @@ class SourcedInterval(str):
     def __html__(self) -> Markup:
         """Return them as elements with their sources."""
         return Markup("{} to {}").format(*self.ends)
-
-
-def _is_wide(interval: str) -> bool:
-    """Return whether the limits of an interval differ as printed."""
-    return isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
 
 
 _MAX_DIGITS = 3  # of errors, whose intervals do not include the limits of a class
@@ -141,7 +137,9 @@ class LimitLine:
     @property
     def parenthesis(self) -> str:
         """The interval in parentheses; empty if it does not differ from the value as printed."""
-        return Markup(" ({})").format(self.interval) if _is_wide(self.interval) else ""
+        interval = self.interval
+        wide = isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
+        return Markup(" ({})").format(interval) if wide else ""
 
 
 @dataclass(frozen=True)
@@ -181,10 +179,8 @@ def format_rankings(
 ) -> Iterator[Ranking]:
     """Yield the ranking for each requirement; ``requirements``: text from the plan."""
     for name, declared in requirements.items():
-        by_sensor: dict[str, list[RankingRow]] = {}
-        for row in rows:
-            if row.requirement == name:
-                by_sensor.setdefault(row.sensor, []).append(row)
+        own = (row for row in rows if row.requirement == name)
+        by_sensor = group_rows(own, lambda row: row.sensor)
         groups = [_group(limits, simulated, system) for limits in by_sensor.values()]
         # By rank, then by margin; sensors without a rank come last.
         groups.sort(key=lambda group: (group.row.rank or 10**6, -(group.row.margin or 0.0)))
@@ -232,11 +228,9 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
 
 
 ErrorRow = RankingRow | ErrorBudgetRow
-"""A row of an error after a time."""
 
 
 def _expected(row: ErrorRow, system: System) -> str:
-    """Return the error of a row; a dash where it is not known."""
     if row.sigma is None:
         return numbers.NO_VALUE
     unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
@@ -278,13 +272,12 @@ def make_budget_tables(
 ) -> Iterator[Json]:
     """Yield the error budget of each recording: a line per error and axis, a column per time."""
     own = [row for row in rows if row.requirement is None]
-    for key in dict.fromkeys((row.sensor, row.recording) for row in own):
-        parts = [row for row in own if (row.sensor, row.recording) == key]
+    for key, parts in group_rows(own, lambda row: (row.sensor, row.recording)).items():
         times = list(dict.fromkeys(row.time for row in parts))
         lines: dict[tuple[str, tuple[float | None, ...]], Json] = {}
         missing: dict[str, None] = {}
-        for error, axis in dict.fromkeys((row.error, row.axis) for row in parts):
-            chosen = [row for row in parts if (row.error, row.axis) == (error, axis)]
+        by_axis = group_rows(parts, lambda row: (row.error, row.axis))
+        for (error, axis), chosen in by_axis.items():
             sigmas = tuple(row.sigma for row in chosen if row.source == "total")
             if not any(sigmas):
                 missing[f"{_NAMES[error]}: {'; '.join(chosen[0].reasons) or 'not known'}"] = None
@@ -312,10 +305,8 @@ def make_budget_tables(
 def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
     """Return a bar for each error and time of the worst axes of a recording: its variance."""
     own = [row for row in rows if row.requirement is None]
-    groups: dict[tuple[str, float], list[ErrorBudgetRow]] = {}
-    for row in own:
-        if row.axis == own[0].axis:
-            groups.setdefault((row.error, row.time), []).append(row)
+    worst = (row for row in own if row.axis == own[0].axis)
+    groups = group_rows(worst, lambda row: (row.error, row.time))
     bars: list[Json] = []
     for (error, time), parts in sorted(groups.items(), key=lambda of: _ERRORS.index(of[0][0])):
         total = _total(parts)
@@ -337,12 +328,10 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
 
 
 def _total(rows: Iterable[ErrorBudgetRow]) -> ErrorBudgetRow | None:
-    """Return the row of the total among the rows of an error and a time."""
     return next((row for row in rows if row.source == "total"), None)
 
 
 def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
-    """Return an error with its interval and its sources."""
     total = _total(rows)
     if total is None or total.sigma is None:
         return {
@@ -402,12 +391,12 @@ def format_backtest(
             "requirement": requirements.get(row.requirement, {}).get("title") or row.requirement,
             "channel": row.channel.replace("_", " "),
             "error": f"{row.error}, {numbers.duration_text(row.time)}",
-            "window": numbers.duration_text(row.window) if row.window is not None else "–",
-            "measured": "–",
-            "predicted": "–",
-            "ratio": "–",
+            "window": numbers.duration_text(row.window),
+            "measured": numbers.NO_VALUE,
+            "predicted": numbers.NO_VALUE,
+            "ratio": numbers.number_text(row.ratio, 3),
             "range": "",
-            "windows": "–",
+            "windows": numbers.NO_VALUE,
             "verdict": row.verdict,
             "contradicted": row.contradicted,
             "why": row.reason or "",
@@ -416,7 +405,6 @@ def format_backtest(
             line["predicted"] = f"{unit.text(row.predicted)} {unit.sign}"
         if row.ratio is not None:
             line["measured"] = f"{unit.text(row.measured)} {unit.sign}"
-            line["ratio"] = numbers.number_text(row.ratio, 3)
             line["range"] = format_range(row.ratio_lower, row.ratio_upper)
             independent = f"({numbers.number_text(row.independent, 2)} independent)"
             line["windows"] = f"{numbers.number_text(row.windows, 9)} {independent}"

@@ -15,6 +15,7 @@ from imubench_pipeline.navigation.verdicts import compact
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.requirements import validate_requirements
+from imubench_pipeline.tables.keys import group_rows
 
 
 def make_models(site: Site) -> str:
@@ -24,9 +25,7 @@ def make_models(site: Site) -> str:
         return "null"
     requirements = validate_requirements(site.settings["requirements"])
     packed = [compact.pack_requirement(*one) for one in requirements.items()]
-    temperature: dict[tuple[str, str], list[TemperatureRow]] = {}
-    for row in site.rows(TemperatureRow):
-        temperature.setdefault((row.sensor, row.recording), []).append(row)
+    temperature = group_rows(site.rows(TemperatureRow), lambda row: (row.sensor, row.recording))
     apart = list_excluded(view.row for view in site.views)
     sensors: dict[str, Any] = {}
     for name, about in settings["sensors"].items():

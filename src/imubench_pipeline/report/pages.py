@@ -58,7 +58,6 @@ THEORY = Entry(
     about="the numbers of this report, explained: from a log at rest to navigation errors",
     context=_describe_theory,
 )
-"""The page that the terms of all other pages link to."""
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "snakemake")
 _RUN_COMMAND = (
@@ -108,11 +107,9 @@ MADE = Entry(
     about="commands, versions and settings",
     context=_describe_making,
 )
-"""The page that the footer of every page links to."""
 
 
 EXPERIMENTS = Entry(file="experiments.html", title="Experiments and method", context=lambda _: {})
-"""The page that lists the pages that are not in the menu."""
 
 _ADDED: Hook[Entry] = Hook("pages")
 

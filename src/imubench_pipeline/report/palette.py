@@ -41,7 +41,6 @@ AXIS_STYLES = {
     axis: Appearance(*_COLOURS[place], "solid", marker)
     for place, (axis, marker) in enumerate((("x", "circle"), ("y", "square"), ("z", "diamond")))
 }
-"""The appearance of the axes of a triad in one figure."""
 
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
@@ -59,7 +58,6 @@ METHOD_STYLES = {
     "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),
     "authors": Appearance("#7A4B3A", "#C69A88", "7px,3px,2px,3px,2px,3px", "circle"),
 }
-"""The appearance of each estimation method."""
 
 Look = dict[str, Any]
 """Keyword arguments of Matplotlib for the look of a line or marker."""

@@ -3,18 +3,18 @@
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow, ModelSampleRow
-from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import METHOD_STYLES, Appearance
 from imubench_pipeline.report.practical import format_printed
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.tables.keys import group_rows
 
 Json = dict[str, Any]
 """Data of a page for its scripts."""
@@ -56,14 +56,14 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 class Arrays:
     """Arrays of a page: each is stored once, as base64 of its codes.
 
-    Code 0 means no value; the others divide the range evenly, or its logarithm. Codes of a
-    logarithm are stored as differences modulo 65536, all low bytes before all high ones.
+    None and NaN are no value, code 0; the others divide the range evenly, or its logarithm. Codes
+    of a logarithm are stored as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
         self._places: dict[Packed, int] = {}
 
-    def exact(self, values: ArrayLike) -> int:
+    def exact(self, values: ArrayLike | Sequence[float | None]) -> int:
         """Store an array as float32; return its index."""
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
@@ -71,7 +71,7 @@ class Arrays:
         """Store positive numbers with a relative error of a few 1e-4; return their index."""
         return self.place(pack_logarithms(values))
 
-    def even(self, values: ArrayLike) -> int:
+    def even(self, values: ArrayLike | Sequence[float | None]) -> int:
         """Store an array for a linear axis in 254 steps; return its index."""
         low, step, codes = _quantise(np.asarray(values, dtype=np.float64), 254)
         return self.place(("e", low, step, codes.astype("<u1").tobytes()))
@@ -253,14 +253,14 @@ def pack_samples(
     return {
         "envelope": {
             channel: {"start": rows[0].start, "end": rows[-1].end, **_pack_envelope(rows, arrays)}
-            for channel, rows in _group_by_channel(envelope).items()
+            for channel, rows in group_rows(envelope, lambda row: row.channel).items()
         },
         "histogram": {
             channel: {
                 "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
                 "count": arrays.log([row.count for row in bins]),
             }
-            for channel, bins in _group_by_channel(histogram).items()
+            for channel, bins in group_rows(histogram, lambda row: row.channel).items()
         },
     }
 
@@ -275,7 +275,7 @@ MODEL_SAMPLE_NAMES = {
 def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
     """Return the samples of a log and of logs simulated from its models, by channel."""
     drawn: Json = {}
-    for channel, of_channel in _group_by_channel(rows).items():
+    for channel, of_channel in group_rows(rows, lambda row: row.channel).items():
         drawn[channel] = {}
         for of, name in MODEL_SAMPLE_NAMES.items():
             envelope = [row for row in of_channel if (row.of, row.what) == (of, "envelope")]
@@ -285,7 +285,7 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
                     "name": name,
                     "end": envelope[-1].end,
                     **_pack_envelope(envelope, arrays),
-                    "stretch": arrays.even(fill_missing(row.mean for row in stretch)),
+                    "stretch": arrays.even([row.mean for row in stretch]),
                     "stretch_end": stretch[-1].end,
                 }
     return drawn
@@ -293,19 +293,4 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
 
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
     names = ("low", "high", "mean")
-    return {n: arrays.even(fill_missing(getattr(row, n) for row in rows)) for n in names}
-
-
-_OfChannel = TypeVar("_OfChannel", bound=ChannelRow)
-
-
-def _group_by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]:
-    channels: dict[str, list[_OfChannel]] = {}
-    for row in rows:
-        channels.setdefault(row.channel, []).append(row)
-    return channels
-
-
-def fill_missing(values: Iterable[float | None]) -> list[float]:
-    """Return the values of a column; NaN where there is none."""
-    return [np.nan if value is None else value for value in values]
+    return {n: arrays.even([getattr(row, n) for row in rows]) for n in names}

@@ -20,7 +20,6 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
-    """Return the units of all symbols; ``level``: unit of B and of the Allan deviation."""
     return {
         **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
@@ -64,7 +63,6 @@ _SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
 
 _PREFIXED_DIMENSIONS = ("velocity", "length")
 _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
-"""Smallest size in SI for each prefix."""
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:

@@ -3,8 +3,7 @@
 import gc
 import sys
 import warnings
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any, TypeVar
@@ -16,10 +15,8 @@ Made = TypeVar("Made")
 _work: Callable[[int], Any]  # of this process
 
 
-def compute_in_order(
-    make: Callable[[int], Made], number: int, first: Sequence[int], processes: int
-) -> Iterator[Made]:
-    """Yield ``make(0)`` to ``make(number - 1)``, beginning with the places ``first``.
+def compute_in_order(make: Callable[[int], Made], number: int, processes: int) -> Iterator[Made]:
+    """Yield ``make(0)`` to ``make(number - 1)``.
 
     ``make`` must not change anything that others use: it may run in a copy of this process. Only
     Linux copies a process safely beside the threads of numerical libraries.
@@ -33,11 +30,9 @@ def compute_in_order(
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
         # Unlike a `Pool`, it ends its processes by a message: a signal could leave a lock taken.
         executor = ProcessPoolExecutor(processes, get_context("fork"), _receive, (make,))
-        begun = {place: executor.submit(_run, place) for place in first}
-        waiting = deque(begun.get(place) or executor.submit(_run, place) for place in range(number))
+        results = executor.map(_run, range(number))
     try:
-        while waiting:
-            yield waiting.popleft().result()
+        yield from results
     finally:
         executor.shutdown(cancel_futures=True)
 

@@ -130,7 +130,6 @@ def _find_unit(reference: str, system: System) -> Unit:
 
 @jinja2.pass_context
 def _link_to(context: Context, path: str) -> str:
-    """Return the relative link from this page to another page or file."""
     return str(context["root"]) + quote(path)
 
 
@@ -153,7 +152,6 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
 
 
 def _make_json(value: Any) -> Markup:
-    """Return JSON that is safe inside a script element."""
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 
@@ -197,7 +195,9 @@ def publish(
     }
     for path, content in (_make_assets() | loaded).items():
         written += _put(folder, path, content)
-    every = list(list_pages(site))
+    # Pages of many recordings take longest; the start page is the last.
+    begun = {entry.file for entry in site.existing[1:]}
+    every = sorted(list_pages(site), key=lambda page: page.path not in begun)
     keys = {page.path: page.key for page in every}
     before = _read_keys(folder / KEYS)
     unchanged = {
@@ -212,16 +212,13 @@ def publish(
         _put(folder, KEYS, _format_json(unchanged))
     templates = make_templates(site.system)
     shown = dict(unchanged)
-    changed = [page for page in every if page.path not in unchanged]
+    changed = [page for page in every if not page.key or page.path not in unchanged]
 
     def make(place: int) -> tuple[bytes, str | None]:
         rendered = _make_page(site, templates, changed[place]).encode()
         return rendered, site.failed.get(changed[place].path)
 
-    # Pages of many recordings take longest.
-    entries = {entry.file for entry in site.existing}
-    longest = [place for place, page in enumerate(changed) if page.path in entries]
-    made = compute_in_order(make, len(changed), longest, processes)
+    made = compute_in_order(make, len(changed), processes)
     for page, (rendered, failure) in zip(changed, made, strict=True):
         say(page.path)
         if failure is None:
@@ -258,7 +255,6 @@ def _make_key(key: str, content: bytes) -> str:
 
 
 def _read_keys(path: Path) -> dict[str, str]:
-    """Return the digests of the existing pages; empty if they are unknown."""
     try:
         return {page: str(key) for page, key in read_json(path).items()}
     except (OSError, ValueError, AttributeError):

@@ -113,7 +113,6 @@ def describe_thermal(channel: ChannelView, system: System) -> list[str]:
 
 
 def _describe_reduction(channel: ChannelView) -> str:
-    """Return the factors by which compensation lowers the Allan deviation, as a sentence."""
     left = channel.compensated
     if not left:
         return ""
@@ -224,18 +223,18 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
 
 
 def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]:
-    """Return an event as a line of the table of findings, and the times of its findings."""
     first = event.findings[0]
     text = events_text(event.findings, system, event.factors())
-    text = text if len(event.findings) == 1 else text.removeprefix(_axes_prefix(event))
+    where = channels_text(event.channels)
+    if where and len(event.findings) > 1:
+        text = text.removeprefix(f"{where[:1].upper()}{where[1:]}. ")
     spans = [(row.start, row.start if row.end is None else row.end)
              for row in event.findings if row.start is not None]  # fmt: skip
     return {
         "number": number,
         "finding": first.finding,
-        "severity": first.severity,
         "matters": event.score() > 0.0 and first.severity != "note",
-        "channel": channels_text(event.channels),
+        "channel": where,
         "linked": False,
         "short": re.split(r"(?<=\D[.;:]) ", numbers.sentence(text), maxsplit=1)[0].rstrip(":;.")
         + ".",
@@ -244,11 +243,6 @@ def _describe_event(number: int, event: Event, system: System) -> dict[str, Any]
         "start": min((start for start, _ in spans), default=None),
         "end": max((end for _, end in spans), default=None),
     }
-
-
-def _axes_prefix(event: Event) -> str:
-    where = channels_text(event.channels)
-    return f"{where[:1].upper()}{where[1:]}. " if where else ""
 
 
 def _tabulate_recommended(quantity: str, channels: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -265,7 +259,6 @@ def _tabulate_recommended(quantity: str, channels: Sequence[dict[str, Any]]) -> 
 
 
 STATIC = RecordingPage("recording.html.jinja", make_recording_context)
-"""The page of a sensor that was at rest."""
 
 
 def _summarise(view: RecordingView, channels: int) -> str:
@@ -358,7 +351,6 @@ def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]
 
 
 def _describe_values(channel: ChannelView, system: System) -> str:
-    """Return the values to use and their uncertainty in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
         unit = choose_page_unit(channel.quantity, symbol, system)

@@ -9,11 +9,10 @@ from typing import get_args
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import FileStatus
-from imubench_pipeline.recordings.drop_zone import account_for, find_logs
-from imubench_pipeline.recordings.known_logs import is_changed
-from imubench_pipeline.report.folder import find_drop_zone, read_failed_pages
+from imubench_pipeline.report.folder import read_failed_pages
 from imubench_pipeline.tables.files import locate_table, read
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import counted, join_names
 from imubench_pipeline.words.verdicts import answer_text
@@ -38,11 +37,8 @@ _DONE = re.compile(r"^Finished jobid: (\d+) ", re.MULTILINE)
 _INTERRUPTED = "Terminating processes on user request"
 
 
-def summarise_run(results: Path, logs: Path | None = None) -> str:
-    """Return the summary of a finished run; empty without tables.
-
-    `logs`: as of `describe_drop_zone`.
-    """
+def summarise_run(results: Path) -> str:
+    """Return the summary of a finished run; empty without tables."""
     paths = {name: locate_table(results, name) for name in SUMMARISED_TABLES}
     if not all(path.exists() for path in paths.values()):
         return ""
@@ -63,7 +59,7 @@ def summarise_run(results: Path, logs: Path | None = None) -> str:
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)
-    lines += describe_drop_zone(results, logs)
+    lines += describe_drop_zone(results)
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
         lines += _bounded(f"  {line}" for line in warned)
@@ -159,8 +155,7 @@ def list_best_sensors(
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
     marks = {row.sensor: (row.sensor, row.recording) in simulated for row in deciding}
     names = {sensor: sensor + " (simulated)" * mark for sensor, mark in marks.items()}
-    for name in dict.fromkeys(row.requirement for row in deciding):
-        own = [row for row in deciding if row.requirement == name]
+    for name, own in group_rows(deciding, lambda row: row.requirement).items():
         ranked = [row for row in own if row.rank is not None]
         ranked.sort(key=lambda row: (row.rank, -(row.margin or 0.0)))
         excluded = sum(row.verdict == "excluded" for row in own)
@@ -179,59 +174,25 @@ def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:
 
 
 def _bounded(lines: Iterable[str]) -> list[str]:
-    """Return the first lines, and the number of further ones."""
     listed = list(lines)
     more = len(listed) - _MOST_LINES
     return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]
 
 
-_MAX_NAMES = 5
-
-
-def describe_drop_zone(results: Path, logs: Path | None = None) -> list[str]:
-    """Return the balance of the last run, and the changes in the drop zone since, as lines.
-
-    `logs`: the drop zone; None: as the report names it.
-    """
+def describe_drop_zone(results: Path) -> list[str]:
+    """Return how many files the last run analysed, rejected and skipped, and why, as lines."""
     try:
         files = FileRow.rows_of(read("files", [results / "tables/files.parquet"]))
     except (OSError, ValueError):
         return []  # missing and damaged files are reported elsewhere
-    logs = logs or find_drop_zone(results)
-    if logs is None:
-        return [*count_files(files), *(["the drop zone of the run is not known"] if files else [])]
-    if logs.is_dir():
-        return [*count_files(files), *_list_changes(files, logs, results)]
-    absent = f"the drop zone {logs} is not here: its files were not compared with the results"
-    return [*count_files(files), absent] if files else []
-
-
-def count_files(files: Sequence[FileRow]) -> Iterator[str]:
-    """Yield how many files were analysed, rejected and skipped, and why files were skipped."""
     if not files:
-        return
+        return []
     counts = Counter(row.status for row in files)
     parts = [f"{counts[name]} {name}" for name in get_args(FileStatus) if counts[name]]
-    yield f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"
+    lines = [f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"]
     skipped = [row for row in files if row.status == "skipped"]
     for row in skipped[:_MOST_LINES]:
-        yield escape_invisible(f"  skipped: {row.file}: {row.reason}")
+        lines.append(escape_invisible(f"  skipped: {row.file}: {row.reason}"))
     if (more := len(skipped) - _MOST_LINES) > 0:
-        yield f"  and {more} more in the table files"
-
-
-def _list_changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:
-    """Yield which files were added to the drop zone, removed or changed since the last run."""
-    recordings = find_logs(logs)
-    before = {row.file for row in files}
-    now = {found.file for found in account_for(logs, recordings)}
-    changed = {
-        f"{log.sensor}/{log.path.name}"
-        for log in recordings
-        if is_changed(log.path, results / "recordings" / log.sensor / log.name)
-    }
-    for what, names in (("added", now - before), ("removed", before - now), ("changed", changed)):
-        if names:
-            shown = ", ".join(sorted(names)[:_MAX_NAMES]) + ", ..." * (len(names) > _MAX_NAMES)
-            number = counted(len(names), "file" if what != "changed" else "log")
-            yield escape_invisible(f"{number} {what} since the last run: {shown}")
+        lines.append(f"  and {more} more in the table files")
+    return lines

@@ -23,16 +23,11 @@ from imubench_pipeline.report.start import explain_missing_rank, summarise_recor
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.events import events_text, missing_axes_texts
-from imubench_pipeline.words.numbers import (
-    NO_VALUE,
-    count_digits,
-    counted,
-    number_text,
-    sentence,
-)
+from imubench_pipeline.words.numbers import NO_VALUE, count_digits, counted, number_text, sentence
 
 _TREND_COLUMNS = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
 _UNIT_SYMBOLS = {"bias": "signal"}
@@ -49,17 +44,8 @@ _MAX_DETAILED_RECORDINGS = 12
 def make_sensor_page(site: Site, sensor: str) -> Page:
     """Return the page of a sensor."""
     own = [view for view in site.views if view.sensor == sensor]
-    key = site.key_of(
-        *(view.key for view in own),
-        *(view.device_page for view in own),
-        [row for row in site.rows(comparisons.PooledRow) if row.sensor == sensor],
-        [row for row in site.rows(comparisons.RepeatabilityRow) if row.sensor == sensor],
-        [row for row in site.rows(comparisons.RankingRow) if row.decides or row.sensor == sensor],
-        [row for row in site.rows(comparisons.CoverageRow) if row.sensor == sensor],
-        site.looks[sensor],
-    )
     context = partial(_make_sensor_context, site, sensor, own)
-    return Page(site.sensor_page(sensor), "sensor.html.jinja", key, context)
+    return Page(site.sensor_page(sensor), "sensor.html.jinja", "", context)
 
 
 def _make_sensor_context(
@@ -84,9 +70,7 @@ def _make_sensor_context(
         rows = list(compare_with_datasheet(channel, site.coverage, site.system))
         if any(row["published"] for row in rows):
             deltas.append({"view": channel, "rows": rows})
-    by_device: dict[tuple[str, str | None], list[RecordingView]] = {}
-    for view in own:
-        by_device.setdefault((view.row.device, view.device_page), []).append(view)
+    by_device = group_rows(own, lambda view: (view.row.device, view.device_page))
     price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
@@ -144,7 +128,6 @@ def _make_sensor_context(
 
 
 def _list_verdicts(site: Site, sensor: str) -> Iterator[tuple[str, Verdict]]:
-    """Yield the name of each requirement, and the verdict on a sensor."""
     rows = site.rows(comparisons.RankingRow)
     deciding = {row.requirement: row for row in rows if row.sensor == sensor and row.decides}
     for name in site.settings["requirements"] if rows else ():
@@ -192,7 +175,6 @@ def _list_missing(own: Sequence[RecordingView]) -> list[str]:
 
 
 def _list_events(own: Sequence[RecordingView], system: System) -> Iterator[str]:
-    """Yield the events that matter most in the recordings."""
     found = [row for view in own for row in view.findings if row.finding not in LEFT_OUT]
     for event in group_events(found)[:_MAX_EVENTS]:
         yield sentence(events_text(event.findings, system, event.factors()))
@@ -233,15 +215,12 @@ def make_device_page(site: Site, page: str) -> Page:
 def _list_trends(
     rows: Sequence[comparisons.DriftRow], *, dated: bool, simulated: bool
 ) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
-    """Return the trends of a device by channel, and the data of their figures."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
     mark = " (simulated)" * simulated
-    for channel, parameter in dict.fromkeys((row.channel, row.parameter) for row in rows):
-        series = sorted(
-            (row for row in rows if (row.channel, row.parameter) == (channel, parameter)),
-            key=lambda row: row.position,
-        )
+    by_parameter = group_rows(rows, lambda row: (row.channel, row.parameter))
+    for (channel, parameter), series in by_parameter.items():
+        series.sort(key=lambda row: row.position)
         if all(row.value is None for row in series):
             continue
         quantity, axis = channel.split("_")
@@ -290,7 +269,6 @@ def describe_change(row: comparisons.DriftRow, *, simulated: bool) -> str:
 
 
 def _describe_margins(row: comparisons.RankingRow) -> str:
-    """Return the margins of a verdict, or the properties that a sensor lacks."""
     if row.verdict == "excluded":
         return "; ".join(map(verdicts.shortfall_text, row.shortfalls))
     if row.margin is None:

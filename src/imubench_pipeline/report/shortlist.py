@@ -58,10 +58,8 @@ SHORTLIST = Entry(
     file="shortlist.html",
     title="Before buying",
     context=_make_context,
-    tables=("coverage", "shortlist"),
     exists=lambda site: bool(site.rows(ShortlistRow)),
 )
-"""The page of all sensors of the catalogue, for every requirement."""
 
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:

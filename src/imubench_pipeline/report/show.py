@@ -101,16 +101,13 @@ def show(parts: "Callable[[int], Iterable[RenderableType]]", width: int | None =
 
 
 def _load(results: Path) -> "dict[str, pa.Table]":
-    from imubench_pipeline.tables.files import TableError, find_tables, read
+    from imubench_pipeline.tables.files import find_tables, read
 
     try:
         paths = find_tables(results, _NEEDED_TABLES)
-    except TableError as error:
-        raise CommandError(str(error)) from error
-    try:
         return {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
-        raise CommandError(f"{error}\n`snakemake -c2` makes the tables again") from error
+        raise CommandError(str(error)) from error
 
 
 def _check(table: "pa.Table", column: str, asked: str | None) -> None:

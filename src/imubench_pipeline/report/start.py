@@ -67,17 +67,18 @@ class Cell:
     requirement: str
     sensor: str
     verdict: Verdict
-    conditions: int  # unknown figures on which the verdict depends
-    margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
-    other_margins: str  # of noise alone, and the likely one
-    bar: tuple[float, float, float] | None  # of the margin and its limits, the places
-    noise: float | None  # of the margin of noise alone, the place
-    likely: tuple[SourcedNumber, float] | None  # margin of a conditional verdict, and its place
-    weak: str  # reasons for weak evidence
-    doubts: str  # doubts about the recordings
-    reason: str  # why it is not judged
-    alternatives: Sequence[tuple[str, SourcedNumber, float]]  # margins as logged and corrected
-    order: float  # larger is better
+    conditions: int = 0  # unknown figures on which the verdict depends
+    # the margin with its 95 % limits
+    margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None = None
+    other_margins: str = ""  # of noise alone, and the likely one
+    bar: tuple[float, float, float] | None = None  # of the margin and its limits, the places
+    noise: float | None = None  # of the margin of noise alone, the place
+    likely: tuple[SourcedNumber, float] | None = None  # margin of a conditional verdict, and place
+    weak: str = ""  # reasons for weak evidence
+    doubts: str = ""  # doubts about the recordings
+    reason: str = ""  # why it is not judged
+    alternatives: Sequence[tuple[str, SourcedNumber, float]] = ()  # margins as logged and corrected
+    order: float = -math.inf  # larger is better
 
     @property
     def word(self) -> str:
@@ -132,9 +133,15 @@ def make_decision_matrix(site: Site) -> Matrix | None:
     scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
     apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
+    unranked = {
+        sensor: explain_missing_rank(view for view in site.views if view.sensor == sensor)
+        for sensor in site.sensors
+    }
     lines = {
         sensor: [
-            _cell(row, scale) if (row := rows.get((name, sensor))) else _empty(site, name, sensor)
+            _cell(row, scale)
+            if (row := rows.get((name, sensor)))
+            else Cell(name, sensor, "not_enough_data", reason=unranked[sensor])
             for name in requirements
         ]
         for sensor in site.sensors
@@ -181,27 +188,35 @@ def explain_missing_rank(own: Iterable[RecordingView]) -> str:
     return verdicts.doubts_text(doubt for view in at_rest for doubt in view.row.doubts)
 
 
-def _empty(site: Site, requirement: str, sensor: str) -> Cell:
-    """Return the cell of a sensor that is not ranked."""
-    reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
-    verdict: Verdict = "not_enough_data"
-    unknown = (None, "", None, None, None, "", "")
-    return Cell(requirement, sensor, verdict, 0, *unknown, reason, (), -math.inf)
-
-
 def _cell(row: RankingRow, scale: Scale) -> Cell:
-    judged = row.margin is not None and row.verdict != "excluded"
-    low, high = compute_margin_limits(row) if judged else (None, None)
-    bar, order = None, -math.inf
-    if row.margin is not None and low is not None and high is not None:
+    if row.margin is None or row.verdict == "excluded":
+        return _make_unjudged_cell(row, scale)
+    low, high = compute_margin_limits(row)
+    log = math.log10(row.margin) if row.margin else -_MAX_ORDER_DECADES
+    log = min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES)
+    bar, likely = None, None
+    if low is not None and high is not None:
         bar = (scale.place(row.margin), scale.place(low), scale.place(high))
-    if judged:
-        log = math.log10(row.margin) if row.margin else -_MAX_ORDER_DECADES
-        place = row.verdict in PASSING_VERDICTS
-        log = min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES)
-        order = round(10.0 * place + log, 4)
-        reason = ""
-    elif row.verdict == "excluded":
+    if row.verdict == "meets_if" and row.likely_margin is not None:
+        likely = _place_margin(row, "likely_margin", row.likely_margin, scale)
+    return Cell(
+        row.requirement,
+        row.sensor,
+        row.verdict,
+        conditions=len(row.conditions),
+        margin=format_margin(row),
+        other_margins=verdicts.other_margins_text(row),
+        bar=bar,
+        noise=None if row.noise_margin is None else scale.place(row.noise_margin),
+        likely=likely,
+        weak=verdicts.evidence_text(row),
+        doubts=verdicts.used_doubts_text(row),
+        order=round(10.0 * (row.verdict in PASSING_VERDICTS) + log, 4),
+    )
+
+
+def _make_unjudged_cell(row: RankingRow, scale: Scale) -> Cell:
+    if row.verdict == "excluded":
         reason = "; ".join(map(verdicts.shortfall_text, row.shortfalls))
     elif row.left_out:
         reason = f"no usable recording: {verdicts.doubts_text(row.left_out)}"
@@ -209,34 +224,21 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
     alternatives = [
-        (words, source_number(row, name, numbers.number_text(size, 2)), scale.place(size))
+        (words, *_place_margin(row, name, size, scale))
         for words, name, size in (
             ("as logged", "logged_margin", row.logged_margin),
             ("if corrected", "corrected_margin", row.corrected_margin),
         )
-        if size is not None and not judged
+        if size is not None
     ]
-    return Cell(
-        row.requirement,
-        row.sensor,
-        row.verdict,
-        len(row.conditions) if judged else 0,
-        format_margin(row) if judged else None,
-        verdicts.other_margins_text(row) if judged else "",
-        bar,
-        scale.place(row.noise_margin) if judged and row.noise_margin is not None else None,
-        (
-            source_number(row, "likely_margin", numbers.number_text(row.likely_margin, 2)),
-            scale.place(row.likely_margin),
-        )
-        if row.verdict == "meets_if" and row.likely_margin is not None
-        else None,
-        verdicts.evidence_text(row) if judged else "",
-        verdicts.used_doubts_text(row) if judged else "",
-        reason,
-        alternatives,
-        order,
-    )
+    names = row.requirement, row.sensor
+    return Cell(*names, row.verdict, reason=reason, alternatives=alternatives)
+
+
+def _place_margin(
+    row: RankingRow, name: str, size: float, scale: Scale
+) -> tuple[SourcedNumber, float]:
+    return source_number(row, name, numbers.number_text(size, 2)), scale.place(size)
 
 
 def summarise_counts(site: Site) -> list[dict[str, object]]:
@@ -372,7 +374,6 @@ def fold_reason(reason: str | None) -> tuple[str, str]:
 
 
 def _group_findings(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
-    """Return each finding once, with its channels."""
     grouped: dict[str, dict[str, None]] = {}
     for row in rows:
         channels = grouped.setdefault(row.finding, {})
@@ -381,34 +382,22 @@ def _group_findings(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
     return [(name, ", ".join(channels)) for name, channels in grouped.items()]
 
 
-@dataclass(frozen=True)
-class _Answer:
-    """The ranking for a requirement, with a summary in sentences."""
-
-    name: str
-    requirement: Requirement
-    groups: Sequence[Group]
-    asked: str
-    answer: str
-    details: Sequence[str]
-    tied: Mapping[str, Sequence[str]]  # by sensor, names of equally good ones
-
-
-def _list_rankings(site: Site) -> Iterator[_Answer]:
+def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
+    """Yield the ranking for each requirement, with a summary in sentences."""
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
     for ranking in format_rankings(rows, site.settings["requirements"], simulated, site.system):
         groups = ranking.groups
         ranked = [group for group in groups if group.row.rank]
-        yield _Answer(
-            ranking.name,
-            ranking.requirement,
-            groups,
-            verdicts.requirement_text(ranking.requirement),
-            _answer(site, groups, ranked),
-            list(_details(site, groups, ranked)),
-            {group.sensor: _name_tied(site, group) for group in groups},
-        )
+        yield {
+            "name": ranking.name,
+            "requirement": ranking.requirement,
+            "groups": groups,
+            "asked": verdicts.requirement_text(ranking.requirement),
+            "answer": _answer(site, groups, ranked),
+            "details": list(_details(site, groups, ranked)),
+            "tied": {group.sensor: _name_tied(site, group) for group in groups},
+        }
 
 
 def _name_tied(site: Site, group: Group) -> list[str]:
@@ -416,7 +405,6 @@ def _name_tied(site: Site, group: Group) -> list[str]:
 
 
 def _answer(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> str:
-    """Return which sensor to choose; a simulated one is marked."""
     marked = {g.sensor: f"{site.names[g.sensor]} (simulated)" for g in ranked if g.simulated}
     excluded = sum(group.row.verdict == "excluded" for group in groups)
     rows = [group.row for group in ranked]
@@ -447,7 +435,6 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
 
 
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
-    """Yield the steps that can change most verdicts."""
     asked = site.settings["requirements"]
     for row in site.rows(NextStepRow)[:_STEPS]:
         yield {
@@ -464,7 +451,6 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
 
 
 def _describe_data(site: Site, row: RankingRow) -> str:
-    """Return the recordings of a verdict, and the doubts about them."""
     own = [view for view in site.views if view.sensor == row.sensor and view.static]
     chosen = next((view for view in own if view.name == row.recording), None)
     left_out = (
@@ -513,16 +499,11 @@ START = Entry(
     file="index.html",
     title="Comparison",
     context=_start,
-    tables=("failures", "files", "pooled", "ranking", "next_steps", "drift", "coverage"),
-    views=lambda site: site.views,
 )
-"""The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
 RECORDINGS = Entry(
     file="recordings.html",
     title="Recordings",
     about="every recording with its status, length, rate and warnings",
     context=_recordings,
-    views=lambda site: site.views,
 )
-"""The page that lists every recording with its state."""

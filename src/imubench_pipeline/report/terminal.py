@@ -23,6 +23,7 @@ from imubench_pipeline.report.meaning import Group, format_rankings
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.events import finding_text
@@ -201,7 +202,6 @@ def _of_log(row: FindingRow, system: System) -> str:
 def _parameter_tables(
     rows: Sequence[ParameterRow], which: str, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
-    """Yield a table for the gyroscopes, and one for the accelerometers."""
     for quantity, title in TITLES.items():
         own = [row for row in rows if quantity_of(row.channel) == quantity]
         if own:
@@ -288,10 +288,7 @@ def _parameter_lines(
     """Return the header, and a line per channel with a column per parameter."""
     symbols = select_symbols(rows)
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in symbols}
-    by_channel: dict[tuple[str, str, str], list[ParameterRow]] = {}
-    for row in rows:
-        name = (row.sensor, row.recording, row.channel)
-        by_channel.setdefault(name, []).append(row)
+    by_channel = group_rows(rows, lambda row: (row.sensor, row.recording, row.channel))
     lines: list[list[str | Text]] = []
     alone = len(about) == 1  # its name is above
     for (sensor, recording, channel), own in by_channel.items():

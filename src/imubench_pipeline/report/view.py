@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
-from pandas.util import hash_array
+from pandas.util import hash_pandas_object
 from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import make_estimate
@@ -286,37 +286,27 @@ def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
 def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
     """Return a digest of the rows of each recording in all tables."""
     digests: dict[Name, hashlib._Hash] = {}
-    for name in BY_RECORDING:
-        table = tables[name]
+    for table_name in BY_RECORDING:
+        table = tables[table_name]
         if not table.num_rows:
             continue
-        rows = np.zeros(table.num_rows, dtype=np.uint64)
-        for column in table.columns:
-            rows *= _HASH_FACTOR
-            if pa.types.is_dictionary(column.type):
-                column = column.cast(pa.string())
-            elif pa.types.is_list(column.type):
-                column = pa.chunked_array(
-                    [[str(value) for value in column.to_pylist()]], pa.string()
-                )
-            if pa.types.is_string(column.type):
-                encoded = column.combine_chunks().dictionary_encode()
-                texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
-                rows += hash_array(texts, categorize=False)[
-                    encoded.indices.fill_null(-1).to_numpy()
-                ]
-            else:
+        plain = table
+        for place, name in enumerate(table.column_names):
+            column = table[place]
+            if pa.types.is_list(column.type):
+                texts = [str(value) for value in column.to_pylist()]
+                plain = plain.set_column(place, name, pa.array(texts, pa.string()))
+            elif pa.types.is_primitive(column.type):
                 # Integers with nulls would become floats, depending on other recordings.
-                rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
+                plain = plain.set_column(place, name, column.cast(pa.float64()))
+        rows = hash_pandas_object(plain.to_pandas(), index=False).to_numpy()
         named = table.select(["sensor", "recording"]).append_column("rows", pa.array(rows))
         for (sensor, recording), part in split_table(named, "sensor", "recording").items():
             digest = digests.setdefault((sensor, recording), hashlib.sha256())
-            digest.update(f"{name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes())
+            digest.update(
+                f"{table_name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes()
+            )
     return {name: digest.hexdigest() for name, digest in digests.items()}
-
-
-_HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
-"""Odd multiplier without a pattern, so that the digest depends on the order of the columns."""
 
 
 def _read_floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:

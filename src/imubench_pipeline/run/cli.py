@@ -4,9 +4,7 @@ import argparse
 import io
 import json
 import os
-import shutil
 import sys
-import textwrap
 from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import partial
@@ -175,11 +173,7 @@ def _check(options: argparse.Namespace) -> int:
         simulated = ", simulated" * quality.recording.simulated
         print(f"{sensor}/{recording}: {shown}{simulated}")
         for finding in quality.findings:
-            line = f"  {finding.severity:8} {finding.finding}: {escape_invisible(finding.detail)}"
-            if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep
-                width = max(shutil.get_terminal_size().columns - 1, 40)
-                line = textwrap.fill(line, width, subsequent_indent=" " * 11)
-            print(line)
+            print(f"  {finding.severity:8} {finding.finding}: {escape_invisible(finding.detail)}")
         sys.stdout.flush()
     return worst
 

@@ -2,14 +2,9 @@
 
 import argparse
 import math
-from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import CommandError
+from imubench_pipeline import units
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-_SENSORS = ("gyro", "accel")
 _SIGNALS = {"gyro": "angular_rate", "accel": "acceleration"}
 
 
@@ -38,20 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the converted figure with its relation; return the exit status."""
-    from imubench_pipeline.units import UnitError
     from imubench_pipeline.words.numbers import number_text
 
-    try:
-        value, relation = convert_figure(
-            arguments.figure,
-            arguments.to,
-            one_sided=arguments.one_sided,
-            rate=arguments.rate,
-            horizon=arguments.horizon,
-            sensitivity=arguments.sensitivity,
-        )
-    except UnitError as error:
-        raise CommandError(str(error)) from error
+    value, relation = convert_figure(
+        arguments.figure,
+        arguments.to,
+        one_sided=arguments.one_sided,
+        rate=arguments.rate,
+        horizon=arguments.horizon,
+        sensitivity=arguments.sensitivity,
+    )
     print(f"{arguments.figure} = {number_text(value, 6)} {arguments.to}{relation}")
     return 0
 
@@ -75,57 +66,41 @@ def convert_figure(
     >>> round(convert_figure("0.005 deg/s/sqrt(Hz)", "deg/sqrt(h)", one_sided=True)[0], 4)
     0.2121
     """
-    from imubench_pipeline.units import (
-        UnitError,
-        convert,
-        convert_from_si,
-        find_conversion,
-        parse_quantity,
-        split_quantity,
-    )
-
-    number, unit = split_quantity(figure)
+    number, unit = units.split_quantity(figure)
     if one_sided:
-        if not any(_is_a(unit, f"{sensor}_density") for sensor in _SENSORS):
-            raise UnitError(f"{unit!r} is no density, so --one-sided does not apply")
-        value = convert(number, unit, to) / math.sqrt(2.0)
+        if not any(_is_a(unit, f"{sensor}_density") for sensor in _SIGNALS):
+            raise units.UnitError(f"{unit!r} is no density, so --one-sided does not apply")
+        value = units.convert(number, unit, to) / math.sqrt(2.0)
         return value, " (N: one-sided density / sqrt(2))"
-
-    def follow(
-        stated: str, of: "Callable[[str], str]", result: str, factor: float, relation: str
-    ) -> tuple[float, str]:
-        """Return the figure times a factor, of the sensor whose dimensions both units have."""
-        for sensor in _SENSORS:
-            if _is_a(unit, of(sensor)):
-                si = find_conversion(unit, of(sensor))[0] * number
-                return convert_from_si(factor * si, to, result.format(sensor)), relation
-        raise UnitError(f"{unit!r} does not belong to {stated}; expected such as deg/s or mg")
-
     if rate is not None:
-        samples = parse_quantity(rate, "frequency")
-        factor, relation = 1.0 / math.sqrt(samples), f" (standard deviation / sqrt({rate}))"
-        return follow("--rate", _SIGNALS.__getitem__, "{}_density", factor, relation)
-    if horizon is not None:
-        seconds = parse_quantity(horizon, "time")
-        factor = math.sqrt(3.0 / seconds)
+        option, result = "--rate", "density"
+        factor = 1.0 / math.sqrt(units.parse_quantity(rate, "frequency"))
+        relation = f" (standard deviation / sqrt({rate}))"
+    elif horizon is not None:
+        option, result = "--horizon", "random_walk"
+        factor = math.sqrt(3.0 / units.parse_quantity(horizon, "time"))
         relation = f" (K: bias instability x sqrt(3 / {horizon}))"
-        return follow("--horizon", _SIGNALS.__getitem__, "{}_random_walk", factor, relation)
-    if sensitivity is not None:
-        for sensor in _SENSORS:
-            scale, scale_unit = split_quantity(sensitivity)
+    elif sensitivity is not None:
+        scale, scale_unit = units.split_quantity(sensitivity)
+        for sensor, signal in _SIGNALS.items():
             if unit in ("LSB", "counts") and _is_a(scale_unit, f"{sensor}_sensitivity"):
-                per_si = find_conversion(scale_unit, f"{sensor}_sensitivity")[0] * scale
-                value = convert_from_si(number / per_si, to, _SIGNALS[sensor])
-                return value, f" (at {sensitivity})"
-        raise UnitError("expected a figure in LSB and a sensitivity such as '131 LSB/(deg/s)'")
-    return float(convert(number, unit, to)), ""
+                per_si = units.find_conversion(scale_unit, f"{sensor}_sensitivity")[0] * scale
+                return units.convert_from_si(number / per_si, to, signal), f" (at {sensitivity})"
+        raise units.UnitError(
+            "expected a figure in LSB and a sensitivity such as '131 LSB/(deg/s)'"
+        )
+    else:
+        return float(units.convert(number, unit, to)), ""
+    for sensor, signal in _SIGNALS.items():
+        if _is_a(unit, signal):
+            si = units.find_conversion(unit, signal)[0] * number
+            return units.convert_from_si(factor * si, to, f"{sensor}_{result}"), relation
+    raise units.UnitError(f"{unit!r} does not belong to {option}; expected such as deg/s or mg")
 
 
 def _is_a(unit: str, dimension: str) -> bool:
-    from imubench_pipeline.units import UnitError, find_conversion
-
     try:
-        find_conversion(unit, dimension)
-    except UnitError:
+        units.find_conversion(unit, dimension)
+    except units.UnitError:
         return False
     return True

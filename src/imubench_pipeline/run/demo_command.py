@@ -1,11 +1,8 @@
 """`imubench demo`: the simulated demonstration, or the analysis of a real log."""
 
 import argparse
-import os
-import sys
 import tarfile
 import tempfile
-import webbrowser
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -41,7 +38,6 @@ REAL_LOG = RealLog(
     member="scikit_divemove-0.4.0/skdiveMove/tests/data/samsung_galaxy_s5.nc",
     sensor=Path(__file__).with_name("lab") / "galaxy_s5.yaml",
 )
-"""The log of ``--real``."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -101,7 +97,7 @@ def describe(log: RealLog, folder: Path) -> str:
 
 
 def analyse_real_log(log: RealLog, file: Path, folder: Path) -> int:
-    """Analyse the log in a downloaded file, and open its page; return the exit status.
+    """Analyse the log in a downloaded file; return the exit status.
 
     Raises ConfigError if the file is not the declared one.
     """
@@ -119,9 +115,4 @@ def analyse_real_log(log: RealLog, file: Path, folder: Path) -> int:
         words = [str(Path(scratch, log.member)), "--sensor", str(log.sensor), "--at-rest"]
         options = parser.parse_args([*words, "--output", str(folder)])
         check_outputs(options, project.find_protected_places)
-        status = analysis.run(options)
-    page = folder / "report.html"
-    has_screen = sys.stdout.isatty() and os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}
-    if has_screen and page.is_file():
-        webbrowser.open(page.resolve().as_uri())
-    return status
+        return analysis.run(options)

@@ -252,8 +252,6 @@ class Plan:
 
     def _experiment(self, sensor: str, name: str) -> str | None:
         """Return the key of the experiment of a recording; None: the sensor was at rest."""
-        if (kind := self.kind(sensor, name)) != AT_REST:
-            return kind
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return next(iter(stated_experiments(self.simulated[sensor, name])), None)
@@ -399,7 +397,6 @@ class Plan:
         return to_json({"requirements": requirements, "sensors": sensors})
 
     def _for_sale(self) -> dict[str, dict[str, object]]:
-        """Return price class and properties of the sensors that are for sale."""
         return {
             name: about | {"abilities": read_abilities(self.sensors[name]).model_dump(mode="json")}
             for name, about in self._described("price_class").items()
@@ -414,7 +411,6 @@ class Plan:
         }
 
     def _described(self, *keys: str) -> dict[str, dict[str, object]]:
-        """Return keys of the sensor files of the sensors with recordings."""
         used = {sensor for sensor, _ in self.recordings}
         return {
             name: sensor.model_dump(mode="json", include=set(keys))
@@ -465,15 +461,9 @@ class Plan:
             if path.stem in TABLES and not self.writes_csv(path.stem):
                 path.unlink(missing_ok=True)
 
-    def catalogue(self, *more: str) -> str:
-        """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""
-        return self._sensor_files(self.sensors, more)
-
-    def sensor_file(self, sensor: str, *more: str) -> str:
-        """Return the datasheet of one sensor, in the form of `catalogue`."""
-        return self._sensor_files({sensor} & self.sensors.keys(), more)
-
-    def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
+    def catalogue(self, *more: str, sensor: str | None = None) -> str:
+        """Return the datasheets of all sensors or one, with vendor, model, grade, and more keys."""
+        names = self.sensors if sensor is None else {sensor} & self.sensors.keys()
         keys = {"vendor", "model", "grade", "temperature_range", "datasheet", *more}
         return to_json(
             {
@@ -541,7 +531,6 @@ def _describe_board(board: simulations.Board) -> dict[str, object]:
 
 
 def _check_places(run: Run) -> None:
-    """Check that the folders of logs, results and sensor files do not overlap."""
     logs, results = run.logs.resolve(), run.results.resolve()
     declared = (run.sensors,) if isinstance(run.sensors, Path) else run.sensors
     if results in [folder.resolve() for folder in declared]:

@@ -132,8 +132,6 @@ def make_step_limits(plan: Plan) -> Limits:
 
 
 def _make_extent_lookup(plan: Plan) -> Callable[[str | None, str | None], Extent]:
-    """Return a cached function for the extent of a recording, a sensor or all."""
-
     @cache
     def extent(sensor: str | None, name: str | None) -> Extent:
         if sensor is None:

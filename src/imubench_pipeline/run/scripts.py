@@ -100,7 +100,6 @@ _CAUSE_VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
 
 
 def _leave_out(outputs: list[Path], params: Any, failure: Failure) -> None:
-    """Write the outputs of a failed step: empty, with the reason."""
     write_empty((path for path in outputs if path.name != QUALITY), failure)
     for path in outputs:
         if path.name == QUALITY:

@@ -193,7 +193,6 @@ def _declared(name: str, stated: Path | None) -> Any:
 
 
 def _origin(options: argparse.Namespace) -> "tuple[Origin, Any]":
-    """Return the model, and the sensor file if there is one."""
     from imubench_pipeline.settings.sensor import CHANNELS
     from imubench_pipeline.simulate import models
     from imubench_pipeline.simulate.from_datasheet import from_datasheet
@@ -241,15 +240,10 @@ def _rate(text: str | None, log: Any) -> float:
 
 
 def _duration(text: str | None, hours: float | None, rate: float) -> float:
-    if text is not None:
-        with add_key_to_errors("--duration: "):
-            duration = parse_quantity(text, "time")
-        option = f"--duration {text}"
-    else:
-        assert hours is not None  # one of them is required
-        duration, option = 3600.0 * hours, f"--hours {hours:g}"
-    if not math.isfinite(duration):
-        raise ConfigError(f"{option}: expected a length of 1 to {_MAX_SAMPLES} samples")
+    """Return the length of the log in s."""
+    option = f"--hours {hours:g}" if text is None else f"--duration {text}"
+    with add_key_to_errors("--duration: "):
+        duration = 3600.0 * (hours or 0.0) if text is None else parse_quantity(text, "time")
     samples = duration * rate
     if not 0.5 < samples <= _MAX_SAMPLES:
         shown = f"{samples:.0f}" if abs(samples) < _MIN_EXPONENT_FORMAT else f"{samples:g}"
@@ -311,7 +305,6 @@ def _section(path: Path, key: str) -> Any:
 def _list_short_files(
     duration: float, motion: "Mapping[str, Profile]", temperature: "Profile | None"
 ) -> list[str]:
-    """List the profile files that do not cover the log."""
     from imubench_pipeline.simulate.profiles import FileColumn
 
     profiles = [*motion.values(), *([] if temperature is None else [temperature])]
@@ -328,7 +321,6 @@ def _list_short_files(
 
 
 def _describe_aliasing(origin: "Origin", rate: float) -> list[str]:
-    """Describe the aliasing of white noise above the Nyquist frequency."""
     from imubench_pipeline.simulate.model import folding
 
     statements = []

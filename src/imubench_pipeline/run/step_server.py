@@ -93,7 +93,6 @@ def serve(requests: socket.socket) -> None:
 _CHILD_SIGNALS = {signal.SIGCHLD}
 
 _STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
-"""Signals that end a step because the run ends."""
 
 _running: dict[int, tuple["Connection[Any, Any]", str]] = {}  # connection and step of each fork
 
@@ -122,7 +121,6 @@ def _reap(signal_number: int, frame: FrameType | None) -> None:
 
 
 def _import_modules_of(script: Path) -> bool:
-    """Import the modules that a script imports; return whether that was possible."""
     try:
         runpy.run_path(str(script), run_name="imports")
         # Deferred imports of two libraries: half of the cost of imports.
@@ -141,7 +139,6 @@ def _nothing() -> None:
 
 
 def _run(connection: "Connection[Any, Any]", job: Job, *, imported: bool) -> None:
-    """Run a script in this fork, report its outcome, and exit."""
     outcome: dict[str, float] | StepError = StepError(f"{job.name}.py failed")
     try:
         for other, _ in _running.values():

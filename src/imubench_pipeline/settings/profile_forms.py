@@ -14,14 +14,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
-from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.settings.validation import Duration, Strict, Text, make_validator
 from imubench_pipeline.units import UnitError, parse_difference, parse_quantity
 
-
-def _check_time(text: str, above_zero: str | None = None) -> None:
-    """Raise, with the key, for a text that is not a time above 0."""
-    if parse_quantity(text, "time") <= 0 and above_zero:
-        raise ValueError(f"{above_zero} is {text}, expected a time above 0")
+_Time = Annotated[Text, make_validator("time")]
 
 
 class ConstantForm(Strict):
@@ -56,14 +52,8 @@ class DayCycleForm(Strict):
     form: Literal["day_cycle"]
     mean: Text
     amplitude: Text = Field(description="a difference: 5 degC and 5 K are the same")
-    period: Text = "24 h"
-    highest: Text = Field("0 s", description="time of the highest value")
-
-    @model_validator(mode="after")
-    def _times(self) -> "DayCycleForm":
-        _check_time(self.period, "period")
-        _check_time(self.highest)
-        return self
+    period: Duration = "24 h"
+    highest: _Time = Field("0 s", description="time of the highest value")
 
 
 class WarmUpForm(Strict):
@@ -72,14 +62,8 @@ class WarmUpForm(Strict):
     form: Literal["warm_up"]
     start: Text
     end: Text
-    time_constant: Text
-    begin: Text = "0 s"
-
-    @model_validator(mode="after")
-    def _times(self) -> "WarmUpForm":
-        _check_time(self.time_constant, "time_constant")
-        _check_time(self.begin)
-        return self
+    time_constant: Duration
+    begin: _Time = "0 s"
 
 
 class FileForm(Strict):

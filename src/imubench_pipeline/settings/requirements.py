@@ -35,7 +35,6 @@ DIMENSIONS: Mapping[str, str] = {
     "cross_track": "length",
     "north": "angle",
 }
-"""The dimension of each error."""
 
 Axis = Literal["worst", "median"]  # the axis of a sensor that a requirement is held against
 

@@ -57,8 +57,6 @@ class Decimal(_Written, float):
 
 
 class _Loader(_SAFE):
-    """Builds plain values; rejects duplicate keys."""
-
     yaml_implicit_resolvers = {}  # noqa: RUF012  # PyYAML declares it as one of an instance
 
     def construct_integer(self, node: yaml.ScalarNode) -> Integer:

@@ -86,7 +86,6 @@ def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]
 
 
 def _read_degrees(table: pa.Table) -> dict[str, Any]:
-    """Return the degrees of freedom of a curve from the columns of its table."""
     return {
         "edf": table["edf"].to_numpy(),
         "edf_upper": table["edf_upper"].to_numpy(),

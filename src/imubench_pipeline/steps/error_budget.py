@@ -66,7 +66,6 @@ def _deviations(
     estimates: Mapping[str, Estimate],
     sections: Mapping[str, Any],
 ) -> Iterator[DrawnDeviationRow]:
-    """Yield the rows of the table ``drawn_deviations``."""
     how = FusionSettings.model_validate(sections["fusion"])
     for name, estimate in estimates.items():
         channel = ComparedChannel(

@@ -302,7 +302,6 @@ class _Channel:
         )
 
     def _blocks(self) -> Iterator[Array]:
-        """Yield the log without deterministic signals."""
         return self.signals.subtract_from(self.log.blocks())
 
     def _stream(self, use: str) -> np.random.Generator:
@@ -319,7 +318,6 @@ _METHODS_BY_PREFERENCE = ("robust", "likelihood", "likelihood_gm", "weighted", "
 
 
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
-    """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
         yield model.ModelRow(
             **asdict(key),
@@ -341,7 +339,6 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
 
 
 def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[model.SpectrumRow]:
-    """Yield the rows of the table ``spectrum``."""
     spectrum, fitted = fit.spectrum, fit.fitted
     for i, frequency in enumerate(spectrum.frequency):
         yield model.SpectrumRow(
@@ -357,7 +354,6 @@ def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[model.SpectrumRow]:
 
 
 def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[model.TemperatureRow]:
-    """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     reason = fit.sensitivity.reason or fit.reason
     figures = {

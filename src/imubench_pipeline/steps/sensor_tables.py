@@ -23,6 +23,7 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import SIMULATIONS, list_true_figures
 from imubench_pipeline.tables.failures import mark_failures, read_with_failures, remove_recordings
 from imubench_pipeline.tables.files import build
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.units import parse_quantity
 
 SensorTable = Callable[
@@ -160,9 +161,7 @@ def drop_duplicate_findings(
     durations: Mapping[tuple[str, str], float],
 ) -> Iterator[FindingRow]:
     """Yield the findings of the ingest that are not in ``deterministic``; `durations` in s."""
-    by_place: dict[tuple[str, str, str], list[model.DeterministicRow]] = {}
-    for row in deterministic:
-        by_place.setdefault((row.sensor, row.recording, row.channel), []).append(row)
+    by_place = group_rows(deterministic, lambda row: (row.sensor, row.recording, row.channel))
     for finding in findings:
         kind = _KIND_OF_FINDING.get(finding.finding)
         if kind is None or finding.channel is None:

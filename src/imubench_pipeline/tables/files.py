@@ -71,8 +71,6 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
                 f"{', '.join(column.values)}"
             )
         array = pa.array(values, type=column.type, from_pandas=True)
-        if pa.types.is_floating(column.type):
-            array = pc.if_else(pc.is_finite(array), array, pa.scalar(None, column.type))
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
@@ -80,23 +78,18 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
 
 
 def _plain(value: Any) -> Any:
-    """Convert a value for Arrow: texts become printable, structs become mappings."""
+    """Convert a value for Arrow: texts become printable, structs mappings, NaN and inf None."""
     if isinstance(value, str):  # a reason may have several lines
         return "\n".join(map(escape_invisible, value.split("\n")))
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
     if isinstance(value, (tuple, list)):
-        return [_plain_part(part) for part in value]
-    return value
-
-
-def _plain_part(value: Any) -> Any:
-    """Return an element of a list, or a field of a struct, as `_plain`; None if not finite."""
+        return [_plain(part) for part in value]
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, Mapping):
-        return {name: _plain_part(part) for name, part in value.items()}
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return _plain(value)
+        return {name: _plain(part) for name, part in value.items()}
+    return value
 
 
 def _not_finite(table: pa.Table) -> str:
@@ -265,7 +258,6 @@ def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
 
 
 def _load_part(path: Path) -> pa.Table:
-    """Return the rows of a file, or of all files of a folder in order, and its metadata."""
     if path.is_dir():
         # Not a date that Snakemake leaves, in a file whose name begins with a dot.
         parts = [_load_part(part) for part in sorted(path.glob("[!.]*.parquet"))]
@@ -288,7 +280,6 @@ def _load_part(path: Path) -> pa.Table:
 
 
 def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
-    """Return how the columns of a table differ from the expected ones; empty if they do not."""
     if actual.names != expected.names:
         missing = [name for name in expected.names if name not in actual.names]
         unknown = [name for name in actual.names if name not in expected.names]

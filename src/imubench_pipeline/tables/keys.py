@@ -1,10 +1,15 @@
 """Key columns of a channel in tables, and grouping of rows by them."""
 
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 import pyarrow as pa
+
+_Key = TypeVar("_Key", bound=Hashable)
+_Row = TypeVar("_Row")
 
 
 @dataclass(frozen=True)
@@ -14,6 +19,14 @@ class Key:
     sensor: str
     recording: str
     channel: str
+
+
+def group_rows(rows: Iterable[_Row], key: Callable[[_Row], _Key]) -> dict[_Key, list[_Row]]:
+    """Divide rows by a key, in the order in which the keys appear."""
+    groups: dict[_Key, list[_Row]] = {}
+    for row in rows:
+        groups.setdefault(key(row), []).append(row)
+    return groups
 
 
 def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:

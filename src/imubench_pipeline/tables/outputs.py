@@ -56,7 +56,6 @@ class Output:
         raise NotImplementedError
 
     def _resolve(self) -> tuple[Path, os.stat_result | None]:
-        """Return the path with links resolved, and its file status."""
         if not str(self.path).isprintable():
             raise OutputError(f"{self}: expected a name of printable characters")
         try:
@@ -79,7 +78,6 @@ class Output:
 
     @contextmanager
     def _explaining(self) -> Iterator[None]:
-        """Name the output in errors of writing."""
         try:
             yield
         except OSError as error:

@@ -48,7 +48,6 @@ def _path(module: str) -> Path:
 
 @cache
 def _used(path: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a module uses directly."""
     text = path.read_text("utf-8")
     files: list[Path] = []
     for package, base, names in _IMPORT.findall(text):

@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path, PurePosixPath
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from imubench_pipeline.tables.files import write_content
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
@@ -126,6 +127,9 @@ class Seal:
         write_sealed_json(asdict(self), results / name_seal_file(self.place))
 
 
+_SEAL = TypeAdapter(Seal)
+
+
 class SealError(ValueError):
     """A damaged or altered seal."""
 
@@ -135,11 +139,6 @@ def name_place(step: str, sensor: str | None = None, recording: str | None = Non
     if recording is not None:
         return f"recordings/{sensor}/{recording}/{step}"
     return f"sensors/{sensor}/{step}" if sensor is not None else step
-
-
-def name_night_place(name: str) -> str:
-    """Return the path of the seal of the results of a nightly run."""
-    return f"{NIGHTS}/{name}"
 
 
 def seal_files(
@@ -186,24 +185,16 @@ def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 def read_seal(results: Path, place: str) -> Seal:
     """Return the seal of a place; FileNotFoundError without one, `SealError` if it is damaged."""
     try:
-        data: Mapping[str, Any] = read_sealed_json(results / name_seal_file(place))
-        outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
-        seal = Seal(**{**data, "outputs": outputs})
-        texts = [seal.place, seal.form, seal.settings, seal.version, *seal.inputs.values()]
-        texts += [file.sha256 for file in outputs.values()]
-        numbers = [n for file in outputs.values() for n in (file.size, file.changed)]
-        names = [PurePosixPath(name) for name in (*seal.inputs, *outputs)]
-        if (
-            not all(isinstance(text, str) for text in texts)
-            or not all(type(number) is int for number in numbers)
-            or any(name.is_absolute() or ".." in name.parts for name in names)
-        ):
+        text = json.dumps(read_sealed_json(results / name_seal_file(place)))
+        seal = _SEAL.validate_json(text, strict=True)
+        names = map(PurePosixPath, (*seal.inputs, *seal.outputs))
+        if any(name.is_absolute() or ".." in name.parts for name in names):
             raise ValueError("no seal")
     except FileNotFoundError:
         raise
     except OSError as error:
         raise SealError(f"cannot be read ({error.strerror})") from error
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+    except ValueError as error:
         raise SealError("is not as it was written") from error
     if seal.place != place:
         raise SealError(f"belongs to {seal.place}")
@@ -230,7 +221,6 @@ def name_seal_file(place: str) -> str:
 
 
 def _below(results: Path, paths: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    """Yield the files of paths, each with its path below the results."""
     for path in paths:
         if path.is_relative_to(results):
             inside = path.rglob("*") if path.is_dir() else [path]

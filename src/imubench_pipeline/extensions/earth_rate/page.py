@@ -23,7 +23,7 @@ from imubench_pipeline.extensions.earth_rate.tables import (
     TurningRow,
 )
 from imubench_pipeline.model.estimates import EnvelopeRow
-from imubench_pipeline.report.payload import Arrays, Json, fill_missing, pack_samples
+from imubench_pipeline.report.payload import Arrays, Json, pack_samples
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.recording import (
     describe_recording,
@@ -287,19 +287,19 @@ def _pack_figures(
                 "name": "drift" if quantity == "drift" else _METHODS[method][1],
                 "time": arrays.exact([row.time for row in own]),
                 "value": arrays.exact([row.value for row in own]),
-                "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
+                "sigma": arrays.exact([row.sigma for row in own]),
             }
         parts[part] = {"range": _find_range(in_part, rows[0].truth), "courses": courses}
     return {
         "channel": rows[0].channel if rows else "",
         "truth": rows[0].truth if rows else None,
         "dwells": {
-            "start": arrays.exact(fill_missing(row.start for row in dwells)),
-            "stop": arrays.exact(fill_missing(row.stop for row in dwells)),
-            "mean": arrays.exact(fill_missing(row.mean for row in dwells)),
+            "start": arrays.exact([row.start for row in dwells]),
+            "stop": arrays.exact([row.stop for row in dwells]),
+            "mean": arrays.exact([row.mean for row in dwells]),
             "north": [row.sense == 1 for row in dwells],
         },
-        "turns": arrays.exact(fill_missing(row.time for row in turns)),
+        "turns": arrays.exact([row.time for row in turns]),
         "found_by": [row.found_by for row in turns],
         "parts": parts,
     }
@@ -324,7 +324,7 @@ def pack_prediction(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> J
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
             "x": arrays.exact([x(row) for row in own]),
-            "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
+            "sigma": arrays.exact([row.sigma for row in own]),
             "turns": [row.turns for row in own],
             "run": own[0].time if own else None,
             "length": own[0].dwell if own else None,
@@ -391,18 +391,14 @@ def _make_context(site: Site) -> Mapping[str, object]:
     }
 
 
-def _select_recordings(site: Site) -> list[RecordingView]:
-    return [*select_turned(site), *select_calibrated(site), *select_predicted(site)]
-
-
 EARTH_RATE_PAGE = Entry(
     file="earth_rate.html",
     title="Earth’s rate",
     about="a gyro turned between north and south: how well it senses the Earth’s rate",
     context=_make_context,
-    tables=("ranking",),
-    views=_select_recordings,
-    exists=lambda site: bool(_select_recordings(site)),
+    exists=lambda site: bool(
+        select_turned(site) or select_calibrated(site) or select_predicted(site)
+    ),
     place=4,
 )
 NOT_FOUND = Section(

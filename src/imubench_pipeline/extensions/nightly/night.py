@@ -45,7 +45,7 @@ from imubench_pipeline.run.recovery import remove_temporary, was_restarted
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.files import write_content, write_json
-from imubench_pipeline.tables.seals import name_night_place, seal_files
+from imubench_pipeline.tables.seals import NIGHTS, seal_files
 
 _MAX_STOP_TIME = 60.0  # s; for Snakemake to stop its steps
 _MAX_LAST_LINES = 20
@@ -264,11 +264,11 @@ class Night:
             write_content(summary.model_dump_json(indent=1) + "\n", files[0])
             write_content(format_summary(summary), files[1])
             log = [self._log] if name != "latest" and self._log.is_file() else []
-            seal_files(self.results, name_night_place(name), [*files, *log], {})
+            seal_files(self.results, f"{NIGHTS}/{name}", [*files, *log], {})
         # Last: if the summary was not written, the next run reports the same news.
         if after is not None:
             after.write(self._state)
-            seal_files(self.results, name_night_place("state"), [self._state], {})
+            seal_files(self.results, f"{NIGHTS}/state", [self._state], {})
 
 
 def _load_results(results: Path) -> Results:

@@ -115,7 +115,6 @@ class Analysis:
         tables: Sequence[str],
         parts: Mapping[tuple[str, str, str], Estimation | ReconstructionRows],
     ) -> None:
-        """Write the tables of each recording from the rows of its channels."""
         for key in self._plan.recordings:
             own = [part for (*of, _), part in parts.items() if tuple(of) == key]
             failure = self._failed.get(key)
@@ -127,7 +126,6 @@ class Analysis:
                     write(table, chain.from_iterable(getattr(part, table) for part in own), path)
 
     def _compare(self, sensor: str, recording: str) -> None:
-        """Compare a recording with its datasheet, and compute its error budget."""
         folder, plan = self._get_folder(sensor, recording), self._plan
         stated = plan.datasheet_settings(sensor)
         tables: dict[str, Iterable[TableRow]] = {
@@ -153,7 +151,7 @@ class Analysis:
             tables = join_tables(
                 own,
                 plan.truths(sensor),
-                plan.sensor_file(sensor, "price_class", "sold"),
+                plan.catalogue("price_class", "sold", sensor=sensor),
                 plan.usual,
                 plan.settings("decide"),
             )

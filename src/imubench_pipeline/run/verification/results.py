@@ -13,9 +13,7 @@ from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.project import find_own_snakefile
 from imubench_pipeline.run.recovery import find_unfinished
 from imubench_pipeline.tables import seals as sealing
-from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables.seals import read_sealed_json
 
 _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
@@ -121,7 +119,6 @@ class Results:
                 )
                 yield self._fault(first, words, place)
         yield from self._unsealed()
-        yield from self._strange_rows()
         for path in find_unfinished(self.folder):
             place = path.relative_to(self.folder).as_posix()
             words = "expected nothing, found an incomplete output of a killed run"
@@ -176,7 +173,6 @@ class Results:
 
     @cached_property
     def _left(self) -> dict[str, sealing.SealedFile]:
-        """Outputs of all steps, by path."""
         return {name: file for seal in self.seals.values() for name, file in seal.outputs.items()}
 
     @cached_property
@@ -193,7 +189,6 @@ class Results:
         return sorted(current)
 
     def _unsealed(self) -> Iterator[Fault]:
-        """Yield the files that no known step has written."""
         for folder in _SEALED_FOLDERS:
             for path in sorted((self.folder / folder).rglob("*")):
                 place = path.relative_to(self.folder)
@@ -207,39 +202,10 @@ class Results:
             if name not in self._left:
                 yield self._fault(name, _NO_SEAL, sealing.NIGHTS + "/")
 
-    def _strange_rows(self) -> Iterator[Fault]:
-        """Yield the tables with recordings that were not compared."""
-        if "tables" not in self.seals:
-            return
-        compared = {
-            (sensor, recording)
-            for place in self._current
-            if place.endswith("/sensor_tables")
-            for name in self.seals[place].inputs
-            if name.endswith("/quality.json")
-            for _, sensor, recording, _ in [name.split("/")]
-        }
-        for name in sorted(set(TABLES) - set(OF_ONE_RECORDING)):
-            place = f"tables/{name}.parquet"
-            path, left = self.folder / place, self.seals["tables"].outputs.get(place)
-            if not path.is_dir() and (left is None or left.fault(path, whole=False)):
-                continue  # it is reported
-            if not {"sensor", "recording"} <= {column.name for column in TABLES[name]}:
-                continue
-            try:
-                rows = read(name, [path])
-            except (OSError, ValueError):
-                continue  # reported as damaged, or of another version
-            keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
-            if strange := {key for key in keys if key[1] is not None} - compared:
-                words = "expected rows of the recordings compared, found some of {}/{}"
-                yield self._fault(place, words.format(*min(strange)), "tables")
-
     def _stray(self, name: str) -> Fault:
         return Fault(name, _NO_SEAL, self._removed(name))
 
     def _fault(self, name: str, found: str, place: str) -> Fault:
-        """Return the fault of a file that a step left, and how the file is made again."""
         mend = self._removed(name)
         if place.startswith(f"{sealing.NIGHTS}/"):
             files = (
