@@ -198,6 +198,6 @@ def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
     only = both[len(fine) :]
     (none,) = build("ranking", ranking_rows(only, requirement, prices, about)).to_pylist()
     assert none["verdict"] == "not_enough_data"
-    assert none["reasons"] == ["moved is not used: the sensor was moved"]
+    assert none["reasons"] == ["recording moved is not used: the sensor was moved"]
     assert none["rank"] is None
     assert none["logged_verdict"] == "fails" and none["corrected_verdict"] is None

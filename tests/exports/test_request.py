@@ -118,12 +118,14 @@ def marked(code: str) -> tuple[DoubtMark, ...]:
 
 def test_an_unfit_recording_is_exported_with_a_reason_alone(tables: dict[str, pa.Table]) -> None:
     moved = judged(tables, decides=False, fitness="unfit", doubts=marked("motion"))
-    with pytest.raises(ExportError, match=r"sim_a is not used: the sensor was moved; .*--because"):
+    with pytest.raises(
+        ExportError, match=r"recording sim_a is not used: the sensor was moved; .*--because"
+    ):
         make_content(moved, REQUEST)
     text = make_content(moved, replace(REQUEST, because="the car stood still"))
     assert isinstance(text, str)
     said = " ".join(text.replace("#", "").split())
-    assert "CAUTION: sim_a is not used: the sensor was moved; used all the same" in said
+    assert "CAUTION: recording sim_a is not used: the sensor was moved; used all the same" in said
     assert "because: the car stood still." in said
     assert yaml.safe_load(text) == yaml.safe_load(str(make_content(tables, REQUEST)))
 

@@ -100,9 +100,9 @@ def test_published_figures_are_counted_by_figure() -> None:
         *covered("c", {"N": "no", "offset": "not looked up"}, quantity="accel"),
     )
     gyro, accel = make_catalogue_tables(rows, [], "practical")
-    assert gyro["counts"] == ["2 of 3 searched", "2 of 2 searched; 1 not searched"]
+    assert gyro["counts"] == ["2 of 3", "2 of 2 (not checked: 1)"]
     assert [line["name"] for line in gyro["lines"]] == ["u A", "V B", "V C"]
-    assert accel["counts"] == ["0 of 1 searched", "0 of 0 searched; 1 not searched"]
+    assert accel["counts"] == ["0 of 1", "0 of 0 (not checked: 1)"]
     assert list(make_catalogue_tables([], [], "practical")) == []
 
 

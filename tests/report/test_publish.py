@@ -273,10 +273,10 @@ def test_what_is_measured_is_not_called_simulated(read: dict[str, Read]) -> None
 
 
 def test_recording_page_shows_the_simulated_truth(read: dict[str, Read]) -> None:
-    rows = read["recordings/two/phantom.html"].naming("truth of the simulation", "tr")
+    rows = read["recordings/two/phantom.html"].naming("simulated with", "tr")
     assert len(rows) == 2 * 2  # of each channel: below its values, and below all methods
     assert all("assumed" in row.text for row in rows)
-    assert "truth of the simulation" not in read["recordings/one/day1.html"].text
+    assert "simulated with" not in read["recordings/one/day1.html"].text
 
 
 def test_values_stand_in_the_units_of_engineers_and_keep_their_si_value(

@@ -18,7 +18,7 @@ LIMIT = (
     "Deciding limit: heading, 100 s. Expected error 0.29 ° (0.23 to 0.34), "
     "allowed 0.573 ° (the limit as 1σ)."
 )
-DATA = "Data: one recording, r (2 h, 1 axis); other units may differ."
+DATA = "Data: one recording, r (2 h, 1 axis); other specimens may differ."
 
 
 def row(sensor: str = "a", **values: Any) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def test_where_no_sensor_can_be_ranked_none_is_the_best() -> None:
         ({"doubts": (DoubtMark("r", "motion"),)}, f"{DATA} Doubts: the sensor was moved."),
         (
             {"left_out": (DoubtMark("q", "suspicious_unit", ("gyro_z",)),)},
-            f"{DATA} Not used: q: the unit of gyro z looks wrong.",
+            f"{DATA} Not used: q: the measurement unit of gyro z looks wrong.",
         ),
         (
             {"recordings": 3, "specimens": 2, "spread": 0.1, "spread_of": "specimens",

@@ -115,8 +115,12 @@ POOLS = [
     of(pools.short_for_windows, "3 consecutive windows of 120 s", 3, 120.0, 360.0, 300.0),
     of(pools.gaps_between_windows, "5 overlapping windows", 5, 3, 120.0, 360.0),
     of(pools.long_sampling_interval, "0.1 Hz", 0.1),
-    of(pools.recording_not_used, "r is not used: it was moved", "r", "it was moved"),
-    of(pools.recordings_not_used, "a is not used: x; b is", [("a", "x"), ("b", "y")]),
+    of(pools.recording_not_used, "recording r is not used: it was moved", "r", "it was moved"),
+    of(
+        pools.recordings_not_used,
+        "recording a is not used: x; recording b is",
+        [("a", "x"), ("b", "y")],
+    ),
 ]
 
 BUDGETS = [

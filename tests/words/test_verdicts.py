@@ -261,7 +261,7 @@ def test_evidence_is_weak_for_reasons() -> None:
     )
     assert weak("wide_interval") == "wide interval"
     marks = (DoubtMark("a", "motion", ("gyro_x",)), DoubtMark("a", "suspicious_unit", ("gyro_z",)))
-    assert weak("suspicious_unit", doubts=marks) == "the unit of gyro z looks wrong"
+    assert weak("suspicious_unit", doubts=marks) == "the measurement unit of gyro z looks wrong"
 
 
 @pytest.mark.parametrize("of", get_args(SpreadOf))

@@ -134,27 +134,17 @@ def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
     worst figure is the worst of both. Where neither prints the figure, the next class below counts.
     Raises a KeyError if no sensor of the catalogue prints it.
     """
-    shipped = _load_shipped()
+    limits = [_load_shipped().get((each, quantity, figure)) for each in _GRADES]
+    known = [limit for limit in limits if limit]
+    if not known:
+        raise KeyError(f"no sensor of the catalogue prints {figure} of the {quantity}")
     if grade is None:
-        values: dict[str, float] = {}
-        for (_, of, name), one in shipped.items():
-            if (of, name) == (quantity, figure):
-                values |= one.sensors
-        if not values:
-            raise KeyError(f"no sensor of the catalogue prints {figure} of the {quantity}")
-        return _summarise("any", quantity, figure, values)
+        every = {name: value for limit in known for name, value in limit.sensors.items()}
+        return _summarise("any", quantity, figure, every)
     place = _GRADES.index(grade)
-
-    def find_first(grades: Iterable[str]) -> ClassLimit | None:
-        found = (shipped.get((each, quantity, figure)) for each in grades)
-        return next((limit for limit in found if limit), None)
-
-    own, better = find_first(_GRADES[place : place + 1]), find_first(_GRADES[place + 1 :])
+    own, better = limits[place], next(filter(None, limits[place + 1 :]), None)
     if own is None:
-        limit = find_first(reversed(_GRADES[:place])) or better
-        if limit is None:
-            raise KeyError(f"no sensor of the catalogue prints {figure} of the {quantity}")
-        return limit
+        return next(filter(None, reversed(limits[:place])), known[0])
     if len(own.sensors) >= _MIN_SENSORS or better is None or better.worst <= own.worst:
         return own
     return _summarise(own.grade, quantity, figure, {**better.sensors, **own.sensors})
@@ -162,12 +152,7 @@ def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
 
 def count_sensors_within(quantity: str, figure: str, largest: float) -> tuple[int, int]:
     """Return how many sensors of the catalogue print at most ``largest``, SI, and how many any."""
-    values = [
-        value
-        for (_, of, name), limit in _load_shipped().items()
-        if (of, name) == (quantity, figure)
-        for value in limit.sensors.values()
-    ]
+    values = find_limit(None, quantity, figure).sensors.values()
     return sum(value <= largest for value in values), len(values)
 
 

@@ -104,8 +104,8 @@ class PrintedAxis:
             own = ends.setdefault(row.figure.option if row.figure else None, [])
             own += [value for value in (row.least, row.value) if value is not None]
         return [
-            replace(row, lower=min(own), upper=max(own))
-            if row.figure and row.value is not None and (own := ends[row.figure.option])
+            replace(row, lower=min(ends[row.figure.option]), upper=max(ends[row.figure.option]))
+            if row.figure and row.value is not None
             else row
             for row in rows
         ]

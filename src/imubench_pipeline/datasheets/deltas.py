@@ -204,15 +204,14 @@ def bias_deltas(
     """
     bias = compute_fixed_bias(channel, means)
     for entry in read_bias_comparables(datasheet, channel):
+        found = bias
         if entry.statistic == SENSITIVITY:
-            yield compare(entry, sensitivity or NO_TEMPERATURE_READINGS, tolerance)
+            found = sensitivity or NO_TEMPERATURE_READINGS
         elif entry.quantity != "offset":
-            yield compare(entry, Parameter(None), tolerance)
+            found = Parameter(None)
         elif bias.value is None and entry.figure:
-            hidden = replace(entry, value=None, lower=None, upper=None, obstacle=bias.reason)
-            yield compare(hidden, bias, tolerance)
-        else:
-            yield compare(entry, bias, tolerance)
+            entry = replace(entry, value=None, lower=None, upper=None, obstacle=bias.reason)
+        yield compare(entry, found, tolerance)
 
 
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:

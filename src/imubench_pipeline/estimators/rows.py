@@ -1,11 +1,13 @@
 """Curves and estimates as rows of the tables, and estimates back from them."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, fields, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import (
@@ -21,38 +23,25 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.keys import Key, split_table
 
+R = TypeVar("R")
+
 
 def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``."""
-    for i, point in enumerate(make_curve_points(curve)):
-        yield AllanRow(
-            **asdict(key),
-            **vars(point),
-            cluster_size=int(curve.cluster_size[i]),
-            averaged=float(curve.averaged[i]),
-            exponent=int(curve.exponent[i]),
-            share=float(curve.share[i]),
-        )
+    names = ("cluster_size", "averaged", "exponent", "share")
+    return make_curve_rows(AllanRow, key, curve, **{name: getattr(curve, name) for name in names})
 
 
-@dataclass(frozen=True)
-class CurvePoint:
-    """A point of a measured curve: the columns that its tables share."""
-
-    tau: float
-    adev: float
-    lower: float
-    upper: float
-    edf: float
-    edf_upper: float
-    edf_source: str
-
-
-def make_curve_points(curve: AllanCurve) -> Iterator[CurvePoint]:
-    """Yield the points of a measured curve, with 95 % limits."""
-    columns = curve.tau, curve.deviation, *curve.limits(0.95), curve.edf, curve.edf_upper
-    numbers = (column.tolist() for column in columns)
-    yield from (CurvePoint(*row) for row in zip(*numbers, curve.edf_source, strict=True))
+def make_curve_rows(
+    kind: Callable[..., R], key: Key, curve: AllanCurve, **more: NDArray[Any]
+) -> Iterator[R]:
+    """Yield rows of a measured curve with 95 % limits, and with more columns, shape (m,)."""
+    columns = {"tau": curve.tau, "adev": curve.deviation, "edf": curve.edf, **more}
+    columns["edf_upper"] = curve.edf_upper
+    columns["lower"], columns["upper"] = curve.limits(0.95)
+    numbers = zip(*(column.tolist() for column in columns.values()), strict=True)
+    for row, source in zip(numbers, curve.edf_source, strict=True):
+        yield kind(**asdict(key), **dict(zip(columns, row, strict=True)), edf_source=source)
 
 
 def make_parameter_rows(

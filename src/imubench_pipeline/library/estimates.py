@@ -94,6 +94,8 @@ class Estimates(ByChannel[ChannelEstimate]):
     ----------
     log : Log
         The log of the estimates; arrays are ingested like files.
+    name : str
+        Of the log: sensor and recording.
     method : str
     findings : tuple of Finding
         Findings of ingest and estimation, as in a run with this log only.
@@ -116,15 +118,10 @@ class Estimates(ByChannel[ChannelEstimate]):
         rows: Estimation,
     ) -> None:
         self._by_channel = {estimate.channel: estimate for estimate in estimates}
-        self.log, self.method = log, method
+        self.log, self.name, self.method = log, log.name, method
         self.findings, self.doubts = tuple(findings), tuple(doubts)
         self.left_out = dict(left_out)
         self.rows = rows
-
-    @property
-    def name(self) -> str:
-        """Sensor and recording."""
-        return self.log.name
 
     @property
     def curves(self) -> Curves:

@@ -6,7 +6,6 @@ import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +57,10 @@ class Log:
     ----------
     sensor, recording : str
         Names. The random streams of an estimate depend on them, as in the workflow.
+    name : str
+        Both of them.
+    simulated : bool
+        Whether the log is simulated, by its own mark or the notes beside it.
     channels : tuple of str
         Channels that can be analysed, of gyro_x to accel_z.
     findings : tuple of Finding
@@ -79,21 +82,15 @@ class Log:
         self.quality, self.declared = quality, sensor
         self.sensor = self._about.sensor
         self.recording = self._about.recording
+        self.name = f"{self.sensor}/{self.recording}"
+        self.simulated = self._about.simulated
         self.bandwidth = bandwidth
         self.channels = tuple(self._logs)
+        with_temperature = any(log.temperature for log in self._logs.values())
+        self._names = (*self.channels, TEMPERATURE) if with_temperature else self.channels
         self._at_rest = recording.was_at_rest(folder)
         rows = [*quality.findings, *implausible_of(quality, sensor)]
         self.findings = tuple(map(make_finding, rows))
-
-    @property
-    def name(self) -> str:
-        """Sensor and recording."""
-        return f"{self.sensor}/{self.recording}"
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the log is simulated, by its own mark or the notes beside it."""
-        return self._about.simulated
 
     @property
     def rates(self) -> dict[str, float]:
@@ -126,12 +123,13 @@ class Log:
 
     def __getitem__(self, channel: str) -> Array:
         """Return a channel, or ``temperature``, on its grid: SI, shape (L,), NaN where missing."""
-        if channel == TEMPERATURE and self._has_temperature:
+        if channel not in self._names:
+            raise KeyError(
+                f"no channel {channel!r} in {self.name}; it has {', '.join(self._names)}"
+            )
+        if channel == TEMPERATURE:
             log = next(log for log in self._logs.values() if log.temperature)
             return recording.place_on_grid(log.temperatures(), log.grid)
-        if channel not in self._logs:
-            there = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
-            raise KeyError(f"no channel {channel!r} in {self.name}; it has {', '.join(there)}")
         log = self._logs[channel]
         return recording.place_on_grid(log.blocks(), log.grid)
 
@@ -140,10 +138,6 @@ class Log:
 
     def __len__(self) -> int:
         return len(self.channels)
-
-    @cached_property
-    def _has_temperature(self) -> bool:
-        return any(log.temperature for log in self._logs.values())
 
     def chosen(self, channels: Channels | None = None) -> dict[str, recording.ChannelLog]:
         """Return channels, by default all, in the form of the steps of the workflow.
@@ -179,8 +173,7 @@ class Log:
 
         if len({(log.grid, log.rate) for log in self._logs.values()}) > 1:
             raise ValueError("the channels have clocks of their own; expected log[channel] of each")
-        names = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
-        columns = {f"{name} [{SI_UNITS[get_dimension(name)]}]": self[name] for name in names}
+        columns = {f"{name} [{SI_UNITS[get_dimension(name)]}]": self[name] for name in self._names}
         length = len(next(iter(columns.values())))
         table = pd.DataFrame(
             columns, index=pd.Index(np.arange(length) / self.rate, name="time [s]")
@@ -189,7 +182,7 @@ class Log:
             "sensor": self.sensor,
             "recording": self.recording,
             "rate": self.rate,
-            "units": {name: SI_UNITS[get_dimension(name)] for name in names},
+            "units": {name: SI_UNITS[get_dimension(name)] for name in self._names},
         }
         return table
 

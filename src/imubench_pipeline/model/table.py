@@ -230,14 +230,13 @@ def columns_of(cls: type[TableRow]) -> tuple[TypedColumn, ...]:
 def _typed(name: str, hint: Any) -> TypedColumn:
     assert get_origin(hint) is Annotated, name
     kind, meaning, *stated = get_args(hint)
-    options = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
-    (plain,) = (option for option in options if option is not types.NoneType)
+    plain = _without_none(kind)
     values = get_args(plain) if get_origin(plain) is Literal else ()
     element = get_args(plain)[0] if get_origin(plain) is tuple else None
     unit = stated[0] if stated else "-"
     arrow = stated[1] if len(stated) > 1 else arrow_type(plain)
     parts = element if is_dataclass(element) else None
-    return TypedColumn(name, arrow, unit, meaning, len(options) == 1, values, parts)
+    return TypedColumn(name, arrow, unit, meaning, plain is kind, values, parts)
 
 
 def arrow_type(kind: Any) -> pa.DataType:

@@ -159,17 +159,15 @@ def _make_rows(
             ]
             value = own.value if own is not None and _get_status(own) == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
-            reasons = [_explain_no_verdict(own, count)] if math.isnan(p) else []
+            tested = not math.isnan(p)
+            reasons = [] if tested else [_explain_no_verdict(own, count)]
             if alone >= 0.0:
                 reasons.append(texts.outlier_before(series.recordings[int(alone)].recording))
             if changed:
                 reasons.append(texts.level_changed(round(count), above=changed > 0.0))
                 if not noise and key[0].startswith("accel"):
                     reasons.append(texts.TILT_CHANGED)
-            p_value: float | None = None
-            verdict: DriftVerdict | None = None
-            if not math.isnan(p):
-                p_value, verdict = p, "changed" if changed else "as before"
+            verdict: DriftVerdict = "changed" if changed else "as before"
             yield DriftRow(
                 sensor=series.sensor,
                 device=series.device,
@@ -186,8 +184,8 @@ def _make_rows(
                 expected_lower=expected[1],
                 expected_upper=expected[2],
                 change=change,
-                p_value=p_value,
-                verdict=verdict,
+                p_value=p if tested else None,
+                verdict=verdict if tested else None,
                 reasons=tuple(reasons),
             )
 

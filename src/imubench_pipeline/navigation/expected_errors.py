@@ -89,11 +89,6 @@ class Question:
         """Quantities that are needed to compute it."""
         return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
-    @property
-    def uses(self) -> tuple[Measured, ...]:
-        """Quantities that are used if they are recorded: accelerometers level a gyro for north."""
-        return MEASURED if self.error == "north" else self.needs
-
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
         if self.error == "north":
@@ -225,11 +220,7 @@ def list_error_rows(
     by channel, and by quantity for a recording without it (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
-    without = {
-        quantity: AxisErrors(figures=figures.get(quantity, in_use.NO_FIGURES))
-        for quantity in MEASURED
-    }
-
+    without = {q: AxisErrors(figures=figures.get(q, in_use.NO_FIGURES)) for q in MEASURED}
     drawn = {
         channel: draw_axis_errors(channel, estimates[channel], errors.figures, draws, seed)
         for channel, errors in axes.items()
@@ -353,16 +344,18 @@ def select_channels(
     question: Question, axes: Mapping[str, AxisErrors]
 ) -> dict[Measured, str | None] | None:
     """Return the gyro and accelerometer channels to use; None if one of them is missing."""
-    if not all(_list_channels(quantity, axes) for quantity in question.needs):
-        return None
     chosen: dict[Measured, str | None] = {"gyro": None, "accel": None}
-    for quantity in question.uses:
-        if not _list_channels(quantity, axes):
+    # Accelerometers level a gyro for north, if they are recorded.
+    for quantity in MEASURED if question.error == "north" else question.needs:
+        channels = _list_channels(quantity, axes)
+        if not channels and quantity in question.needs:
+            return None
+        if not channels:
             continue
         # Rank the axes by their own part of the error.
         parts = {
             channel: question.answer(**{**_NO_ERRORS, quantity: axes[channel]}).total
-            for channel in _list_channels(quantity, axes)
+            for channel in channels
         }
         ranked = sorted(parts, key=parts.__getitem__)
         # Of two axes the median is the worse one.

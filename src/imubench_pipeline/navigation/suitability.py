@@ -195,15 +195,10 @@ class Conditions:
         if self.shortfalls:
             return "excluded", ()
         if verdict == "meets_if":
-            return verdict, self.conditions
+            return verdict, (*make_figure_conditions(self.figures), *self.unknown)
         if self.unknown and verdict in PASSING_VERDICTS:
             return "meets_if", self.unknown
         return verdict, ()
-
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """Unknown figures and properties."""
-        return (*make_figure_conditions(self.figures), *self.unknown)
 
 
 def make_figure_conditions(figures: Mapping[tuple[str, Cause], float]) -> tuple[Condition, ...]:

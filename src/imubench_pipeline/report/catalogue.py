@@ -138,8 +138,8 @@ def format_counts(published: Iterable[str]) -> str:
     """Return how many sensors publish a figure, and for how many it was not looked up."""
     counts = Counter(published)
     unknown = counts["not looked up"]
-    text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown} searched"
-    return f"{text}; {unknown} not searched" if unknown else text
+    text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown}"
+    return f"{text} (not checked: {unknown})" if unknown else text
 
 
 def _make_share(rows: Sequence[CoverageRow]) -> Json:

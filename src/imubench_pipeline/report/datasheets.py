@@ -125,13 +125,11 @@ def compare_sensors_with_datasheets(
                 }
             )
         time = first.condition if first.statistic == "adev" else None
-        differ = len({one["measured"] for one in readings}) > 1
         yield {
             "sensor": sensor,
             "simulated": simulated,
-            "measured": list(
-                dict.fromkeys((one["measured"], one["as"] if differ else "") for one in readings)
-            ),
+            "comparable": _name_different(readings, "comparable"),
+            "measured": _name_different(readings, "measured"),
             "channel": channel,
             "quantity": _name_figure(first),
             "printed": format_printed(first),
@@ -145,6 +143,13 @@ def compare_sensors_with_datasheets(
                 for verdict, count in verdicts.items()
             ),
         }
+
+
+def _name_different(readings: Sequence[Mapping[str, str]], of: str) -> list[tuple[str, str]]:
+    """Return a number of all interpretations, each with its name; once if they are equal."""
+    if len({one[of] for one in readings}) == 1:
+        return [(readings[0][of], "")]
+    return [(one[of], one["as"]) for one in readings]
 
 
 def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:

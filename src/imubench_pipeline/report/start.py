@@ -219,7 +219,7 @@ def _make_unjudged_cell(row: RankingRow, scale: Scale) -> Cell:
     if row.verdict == "excluded":
         reason = "; ".join(map(verdicts.shortfall_text, row.shortfalls))
     elif row.left_out:
-        reason = verdicts.doubts_text(row.left_out)
+        reason = f"no usable recording: {verdicts.doubts_text(row.left_out)}"
     else:
         reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
@@ -461,7 +461,7 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     axes = numbers.counted(len(chosen.recommended()), "axis", "axes")
     log = f"{chosen.name} ({numbers.duration_text(chosen.row.duration)}, {axes})"
     if row.recordings == 1:
-        text = f"Data: one recording, {log}; other units may differ."
+        text = f"Data: one recording, {log}; other specimens may differ."
     else:
         units = f" of {numbers.counted(row.specimens, 'unit')}" if row.specimens is not None else ""
         text = f"Data: {row.recordings} recordings{units}; {log} is nearest to the prediction."

@@ -219,12 +219,12 @@ class _Channel:
         if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                points = rows.make_curve_points(limited(left, without))
-                for point, effect in zip(points, added.deviation, strict=True):
-                    row = model.CompensatedAllanRow(
-                        **asdict(key), **vars(point), temperature=float(effect)
-                    )
-                    into.allan_compensated.append(row)
+                into.allan_compensated += rows.make_curve_rows(
+                    model.CompensatedAllanRow,
+                    key,
+                    limited(left, without),
+                    temperature=added.deviation,
+                )
         return estimates
 
     def state_effects(

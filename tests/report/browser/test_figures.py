@@ -128,7 +128,7 @@ def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> Non
     np.testing.assert_allclose(curve["y"], expected, rtol=LEVELS)
 
     page.get_by_label("gyro x", exact=True).check()
-    page.get_by_role("combobox", name="Recordings").select_option("last of each sensor")
+    page.get_by_role("combobox", name="Recordings").select_option("latest of each sensor")
     last = made.DATED[-1].recording
     assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
 

@@ -156,7 +156,7 @@ def test_what_is_wrong_stands_in_words(seen: Seen) -> None:
         in seen.pages[f"recordings/alpha/{made.NIGHT.recording}.html"]["text"]
     )
     simulated = seen.pages["recordings/alpha/sim_published.html"]["text"]
-    assert "not measured" in simulated and "truth of the simulation" in simulated
+    assert "not measured" in simulated and "simulated with" in simulated
 
 
 def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:

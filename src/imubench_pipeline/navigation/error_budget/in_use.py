@@ -74,11 +74,6 @@ class Use:
     vibration_frequency: float = 10.0  # its lowest frequency, Hz
     over: float = 1.0  # time during which temperature, heading and speed change evenly, s
 
-    @property
-    def turn(self) -> Turn | None:
-        """The turn, if there is one; it may be on the spot."""
-        return Turn(self.turns, self.over, self.speed) if self.turns > 0.0 else None
-
 
 NO_USE = Use()
 
@@ -168,10 +163,9 @@ def list_turn_levers(
     ``levelled``: the tilt was found by the accelerometers. It cancels a constant error of these,
     until a turn carries the error with the vehicle, and leaves the tilt behind.
     """
-    turn = use.turn
-    if turn is None:
+    if use.turns <= 0.0:
         return
-    speed = use.speed
+    turn, speed = Turn(use.turns, use.over, use.speed), use.speed  # it may be on the spot
     if quantity in ("velocity", "position"):
         order = 0 if quantity == "velocity" else 1
         if measured == "accel":

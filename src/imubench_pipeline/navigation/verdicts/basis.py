@@ -59,13 +59,11 @@ class Basis:
 
     def device(self, key: Key) -> str:
         """Return the specimen of a recording; by default each recording is its own specimen."""
-        row = self.recordings.get(key)
-        return row.device if row else key[1]
+        return self.recordings[key].device if key in self.recordings else key[1]
 
     def duration(self, key: Key) -> float | None:
         """Return the length of a recording, s; None if it is not known."""
-        row = self.recordings.get(key)
-        return row.duration if row else None
+        return self.recordings[key].duration if key in self.recordings else None
 
     def longest(self, rows: Iterable[OfRecordingRow]) -> float | None:
         """Return the length of the longest recording of rows, s; None if none is known."""
@@ -74,8 +72,7 @@ class Basis:
 
     def doubted(self, key: Key) -> tuple[DoubtMark, ...]:
         """Return the doubts about a recording."""
-        row = self.recordings.get(key)
-        return row.doubts if row else ()
+        return self.recordings[key].doubts if key in self.recordings else ()
 
     def axes(self, key: Key, quantity: str) -> int | None:
         """Return the number of axes of a quantity with known noise; None without an analysis."""

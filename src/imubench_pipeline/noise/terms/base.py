@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import NoiseSource, SourcePath
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, factor_covariance
+from imubench_pipeline.noise.state_space import (
+    ContinuousSpace,
+    StateSpace,
+    draw_block_sums,
+    factor_covariance,
+)
 from imubench_pipeline.typing import Array
 
 if TYPE_CHECKING:
@@ -197,9 +202,15 @@ class Term(ABC):
         A walk starts at the first sample of the first block.
         """
 
-    @abstractmethod
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw the sums over adjacent blocks of ``width`` samples of a simulated log, exactly."""
+        """Draw the sums over adjacent blocks of ``width`` samples of a simulated log, exactly.
+
+        By default jointly with the one state of the term; TypeError if it has another number.
+        """
+        space = self.state_space(1.0 / rate)
+        if len(space.output) != 1:
+            raise TypeError(f"{self} has {len(space.output)} states; expected one")
+        return draw_block_sums(space, self.start(rng, 1.0 / rate), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading | None:
         """Return where a curve, lowest at a tau in s, shows its parameter; None: nowhere."""

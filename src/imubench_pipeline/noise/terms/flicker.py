@@ -136,10 +136,6 @@ class Flicker(Term):
         """Raise TypeError: it has no covariance."""
         raise TypeError("flicker noise has no covariance; take its Gauss-Markov bank")
 
-    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Raise TypeError: block sums are drawn from its bank."""
-        raise TypeError("flicker noise has no finite state space; take its Gauss-Markov bank")
-
     def reading(self, lowest_tau: float) -> Reading:
         """0.664 B at every tau; read where the curve is lowest."""
         return Reading(lowest_tau, gauss_markov.FLOOR * self.B, "B", gauss_markov.FLOOR)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline.noise.exponentials import evaluate_decay, integrate_squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms import base
 from imubench_pipeline.noise.terms.power_laws import RandomWalk
 from imubench_pipeline.typing import Array
@@ -186,12 +186,6 @@ class GaussMarkov(base.Term):
         own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
         np.fill_diagonal(covariance, variance * own)
         return covariance
-
-    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw them jointly with the states at the ends of the blocks."""
-        interval = 1.0 / rate
-        space = self.state_space(interval)
-        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> base.Reading:
         """0.664 B at the peak."""

@@ -15,7 +15,7 @@ from imubench_pipeline.noise.growth import (
     of_white,
     of_white_mean,
 )
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms import base
 from imubench_pipeline.typing import Array
 
@@ -260,12 +260,6 @@ class RandomWalk(base.Term):
         np.fill_diagonal(covariance, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
         covariance *= self.K**2 * (1.0 / blocks.rate)
         return np.asarray(covariance)
-
-    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw them with the states at their ends."""
-        interval = 1.0 / rate
-        space = self.state_space(interval)
-        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> base.Reading:
         """K at 3 s."""

@@ -29,7 +29,7 @@ function startChooser(root) {
   });
   chooser.append(axisChooser("channel", present, redrawAll), labelled("Model drawn", method));
   if (pageData.grouped === "sensor" && new Set(pageData.channels.map((view) => view.recording)).size > 1) {
-    const which = element("select", {}, new Option("all", "all"), new Option("last of each sensor", "last"));
+    const which = element("select", {}, new Option("all", "all"), new Option("latest of each sensor", "last"));
     which.value = everyRecording ? "all" : "last";
     which.addEventListener("change", () => {
       everyRecording = which.value === "all";

@@ -117,7 +117,7 @@ def long_sampling_interval(rate: float) -> str:
 
 
 def recording_not_used(recording: str, doubts: str) -> str:
-    return f"{recording} is not used: {doubts}"
+    return f"recording {recording} is not used: {doubts}"
 
 
 def recordings_not_used(reasons: Sequence[tuple[str, str]]) -> str:
