@@ -91,34 +91,7 @@ class Cell:
         return bool(self.weak or self.doubts)
 
 
-@dataclass(frozen=True)
-class Column:
-    """A requirement."""
-
-    name: str
-    title: str
-    limits: Sequence[str]
-
-    @property
-    def short(self) -> str:
-        """The name in words."""
-        return self.name.replace("_", " ").capitalize()
-
-
-@dataclass(frozen=True)
-class Matrix:
-    """All sensors and requirements."""
-
-    answer: str  # the sensors to choose
-    evidence: str  # how sure it is
-    columns: Sequence[Column]
-    lines: Sequence[tuple[str, Sequence[Cell]]]  # by sensor, the best first
-    apart: Mapping[str, str]  # sensors that are not compared, and why
-    scale: Scale
-    legend: Sequence[tuple[Verdict, str, str]]  # verdict, its word and meaning
-
-
-def make_decision_matrix(site: Site) -> Matrix | None:
+def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
     """Return the matrix of a report; None if there are no requirements."""
     requirements = site.settings["requirements"]
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
@@ -126,8 +99,8 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         return None
     drawn: list[float | None] = []
     for deciding in rows.values():
-        drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
-        drawn += [deciding.noise_margin]
+        drawn += [deciding.logged_margin, deciding.corrected_margin]
+        drawn += [deciding.margin, deciding.noise_margin]
         drawn += [deciding.likely_margin] if deciding.verdict == "meets_if" else []
         drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
@@ -164,20 +137,22 @@ def make_decision_matrix(site: Site) -> Matrix | None:
             f"{x.error.replace('_', ' ')} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
             for x in requirement.limits
         ]
-        columns.append(Column(name, requirement.title, limits))
-        best[columns[-1].short] = rows[name, first.sensor] if first else None
-    return Matrix(
-        verdicts.summary_text(best, site.names),
-        verdicts.evidence_summary_text(row for key, row in rows.items() if key[1] not in apart),
-        columns,
-        sorted(lines.items(), key=lambda line: order(line[0])),
-        apart,
-        scale,
-        [
+        short = name.replace("_", " ").capitalize()
+        columns.append({"name": name, "title": requirement.title, "short": short, "limits": limits})
+        best[short] = rows[name, first.sensor] if first else None
+    compared = (row for (_, sensor), row in rows.items() if sensor not in apart)
+    return {
+        "answer": verdicts.summary_text(best, site.names),
+        "evidence": verdicts.evidence_summary_text(compared),
+        "columns": columns,
+        "lines": sorted(lines.items(), key=lambda line: order(line[0])),
+        "apart": apart,
+        "scale": scale,
+        "legend": [
             (verdict, verdicts.SHORT_VERDICTS[verdict], verdicts.VERDICT_MEANINGS[verdict])
             for verdict in _VERDICTS
         ],
-    )
+    }
 
 
 def explain_missing_rank(own: Iterable[RecordingView]) -> str:
