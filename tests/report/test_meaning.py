@@ -51,14 +51,14 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    (shown,) = format_rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
-    assert [(g.rank, g.sensor, g.stated) for g in shown.groups] == [
+    ((_, shown),) = format_rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
+    assert [(g.rank, g.sensor, g.stated) for g in shown] == [
         ("1", "good", "meets the limits"),
         ("2", "poor", "fails"),
         ("–", "gyro", "not enough data"),
     ]
-    assert [group.simulated for group in shown.groups] == [True, False, False]
-    heading, position = shown.groups[1].limits
+    assert [group.simulated for group in shown] == [True, False, False]
+    heading, position = shown[1].limits
     assert (heading.sigma.unit, position.allowed.unit) == ("°", "m")
     # The bias from 10 s at rest, held for 100 s: N sqrt(t^2 / W) against N sqrt(t), known to 10 %.
     assert heading.sigma == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.2g} °"
@@ -71,9 +71,9 @@ def test_verdict_groups_have_the_doubts_of_their_logs() -> None:
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     marks = (DoubtMark("r", "knocks", ("gyro_x",)),)
     doubted = [replace(row, doubts=marks if row.sensor != "good" else ()) for row in table]
-    (shown,) = format_rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
+    ((_, shown),) = format_rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
     # Of the third nothing is known, and the reason says why.
-    assert [group.doubts for group in shown.groups] == ["", "knocks in gyro x", ""]
+    assert [group.doubts for group in shown] == ["", "knocks in gyro x", ""]
 
 
 def test_a_budget_names_its_sources_and_what_is_missing() -> None:

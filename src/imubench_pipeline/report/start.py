@@ -25,7 +25,7 @@ from imubench_pipeline.report.meaning import (
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.words import numbers, verdicts
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -93,7 +93,7 @@ class Cell:
 
 def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
     """Return the matrix of a report; None if there are no requirements."""
-    requirements = site.settings["requirements"]
+    requirements = validate_requirements(site.settings["requirements"])
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
@@ -128,11 +128,10 @@ def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
 
     columns, best = [], {}
-    for place, (name, declared) in enumerate(requirements.items()):
+    for place, (name, requirement) in enumerate(requirements.items()):
         cells = [cells[place] for cells in lines.values()]
         judged = [cell for cell in cells if cell.margin]
         first = max(judged, key=lambda cell: cell.order, default=None)
-        requirement = Requirement.model_validate(declared)
         limits = [
             f"{x.error.replace('_', ' ')} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
             for x in requirement.limits
@@ -361,14 +360,14 @@ def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the ranking for each requirement, with a summary in sentences."""
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
-    for ranking in format_rankings(rows, site.settings["requirements"], simulated, site.system):
-        groups = ranking.groups
+    requirements = validate_requirements(site.settings["requirements"])
+    for name, groups in format_rankings(rows, requirements, simulated, site.system):
         ranked = [group for group in groups if group.row.rank]
         yield {
-            "name": ranking.name,
-            "requirement": ranking.requirement,
+            "name": name,
+            "requirement": requirements[name],
             "groups": groups,
-            "asked": verdicts.requirement_text(ranking.requirement),
+            "asked": verdicts.requirement_text(requirements[name]),
             "answer": _answer(site, groups, ranked),
             "details": list(_details(site, groups, ranked)),
             "tied": {group.sensor: _name_tied(site, group) for group in groups},
