@@ -21,7 +21,6 @@ from imubench_pipeline.report.practical import System, format_temperature
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import explain_missing_rank, summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
-from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.keys import group_rows
@@ -290,7 +289,7 @@ def trace_verdicts(
         if view.static
     ]
     simulated = {view.full_name: view.simulated for view in own}
-    requirements = validate_requirements(site.settings["requirements"] if rows else {})
+    requirements = site.requirements if rows else {}
     for name, groups in meaning.format_rankings(own_rows, requirements, simulated, site.system):
         requirement = requirements[name]
         about = {

@@ -25,7 +25,6 @@ from imubench_pipeline.report.meaning import (
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.words import numbers, verdicts
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -93,7 +92,6 @@ class Cell:
 
 def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
     """Return the matrix of a report; None if there are no requirements."""
-    requirements = validate_requirements(site.settings["requirements"])
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
@@ -115,7 +113,7 @@ def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
             _cell(row, scale)
             if (row := rows.get((name, sensor)))
             else Cell(name, sensor, "not_enough_data", reason=unranked[sensor])
-            for name in requirements
+            for name in site.requirements
         ]
         for sensor in site.sensors
         if sensor not in apart
@@ -128,7 +126,7 @@ def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
 
     columns, best = [], {}
-    for place, (name, requirement) in enumerate(requirements.items()):
+    for place, (name, requirement) in enumerate(site.requirements.items()):
         cells = [cells[place] for cells in lines.values()]
         judged = [cell for cell in cells if cell.margin]
         first = max(judged, key=lambda cell: cell.order, default=None)
@@ -360,14 +358,13 @@ def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the ranking for each requirement, with a summary in sentences."""
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
-    requirements = validate_requirements(site.settings["requirements"])
-    for name, groups in format_rankings(rows, requirements, simulated, site.system):
+    for name, groups in format_rankings(rows, site.requirements, simulated, site.system):
         ranked = [group for group in groups if group.row.rank]
         yield {
             "name": name,
-            "requirement": requirements[name],
+            "requirement": site.requirements[name],
             "groups": groups,
-            "asked": verdicts.requirement_text(requirements[name]),
+            "asked": verdicts.requirement_text(site.requirements[name]),
             "answer": _answer(site, groups, ranked),
             "details": list(_details(site, groups, ranked)),
             "tied": {group.sensor: _name_tied(site, group) for group in groups},
@@ -409,7 +406,6 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
 
 
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
-    asked = site.settings["requirements"]
     for row in site.rows(NextStepRow)[:_STEPS]:
         yield {
             "sensor": row.sensor,
@@ -420,7 +416,7 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
             ),
             "text": numbers.sentence(row.text),
             "brief": numbers.sentence(verdicts.next_step_text(row, brief=True)),
-            "about": "; ".join(asked[name]["title"] for name in row.requirements),
+            "about": "; ".join(site.requirements[name].title for name in row.requirements),
         }
 
 
