@@ -22,7 +22,6 @@ _MIN_MAGNITUDE = 1e-75
 """Least magnitude of the largest value of a column, SI. A column of smaller values is set to 0:
 they are no measurements, and their squares underflow."""
 
-
 _MIN_FACTOR_OF_OTHER_UNIT = 1.5
 """Least ratio of two different units. The ratio of mg and cm/s² is 1.02, but no logger uses both;
 the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""

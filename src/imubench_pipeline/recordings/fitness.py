@@ -29,7 +29,6 @@ WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
 }
 """Tables of one recording whose rows repeat the doubts about it."""
 
-
 Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
 Doubted = TypeVar("Doubted", bound=TableRow)
 

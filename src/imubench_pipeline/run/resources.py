@@ -38,7 +38,6 @@ class Limit:
 
 Limits = Callable[[str, str | None], Limit]  # of sensor and recording; None: the whole sensor
 
-
 Asked = Callable[[Mapping[str, str], int], int]  # takes the wildcards of a job, and its attempt
 
 

@@ -60,7 +60,6 @@ def make_number_type(
 MOST_WHOLE = 2**63 - 1
 LONGEST = 1e10  # s, three centuries
 
-
 NO_RESULTS = "the requested data are missing, or cannot be used"
 """Meaning of the exit status 2 of commands that show results."""
 

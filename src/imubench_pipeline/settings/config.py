@@ -30,7 +30,6 @@ from imubench_pipeline.typing import JsonObject
 _SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
 _SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "samples", "tables", "report"}
 
-
 _Section = TypeVar("_Section", bound=BaseModel)
 Folders = NamedPath | Annotated[tuple[NamedPath, ...], Field(min_length=1)]
 

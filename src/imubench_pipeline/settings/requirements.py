@@ -53,7 +53,6 @@ Outage = Annotated[Time, make_validator("time", "an outage of 2 s to 1 h", withi
 """How long there is no GNSS: a few fixes at least."""
 Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
 
-
 Trajectory = Literal["field", "car", "drone", "rest"]
 """The simulated drives on which filters are run."""
 
@@ -118,11 +117,9 @@ def _axes(text: str) -> str:
 Rate = Annotated[Text, make_size_validator("angular_rate"), Field(examples=["300 deg/s"])]
 Acceleration = Annotated[Text, make_size_validator("acceleration"), Field(examples=["8 g"])]
 
-
 _change = make_validator(
     "temperature", "a difference above zero, such as 20 K", to_si=parse_difference
 )
-
 
 _BIAS = "a standard deviation from 0, with its unit"
 

@@ -142,7 +142,6 @@ Reader = Literal["csv", "vectornav", "ubx", "novatel", "ulog", "dataflash", "ros
                  "numpy", "arrow", "hdf5", "excel"]  # fmt: skip
 """The formats of log files; each is declared in ``readers/formats.py``, or by an extension."""
 
-
 _MIN_RATE, _MAX_RATE = 1e-6, 1e9  # range of valid sampling rates, Hz
 
 

@@ -137,7 +137,6 @@ Rate = Annotated[Text, make_validator("angular_rate"), Field(examples=["-10 deg/
 RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
 AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
 
-
 _Model = TypeVar("_Model", bound=BaseModel)
 
 

@@ -15,7 +15,6 @@ FILE = "datapackage.json"
 _TYPES = {pa.float64(): "number", pa.int64(): "integer", pa.bool_(): "boolean"}
 _RECORDING = ["sensor", "recording"]
 
-
 _CSV = {"format": "csv", "mediatype": "text/csv", "encoding": "utf-8"}
 _PARQUET = {"format": "parquet", "mediatype": "application/vnd.apache.parquet"}
 

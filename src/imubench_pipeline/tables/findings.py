@@ -10,7 +10,6 @@ from imubench_pipeline.words.findings.base import FindingData
 
 LEFT_OUT = ("rejected", "failed")  # of recordings that are left out: listed by themselves
 
-
 _HALF_REASON = 700
 _ADDRESS = re.compile(r" at 0x[0-9a-f]{6,}")
 

@@ -61,7 +61,6 @@ _MISSING_SIGNS = "-*?#."
 _MAX_REPEATED_SIGNS = 24
 _PADDINGS = ("{}", " {}", "  {}", "{} ")
 
-
 _STAMP = re.compile(r"\s*\d{1,4}[-./:]\d{1,2}[-./:]\d{1,4}[\dTZ:.,/+\s-]*")
 
 

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, joined, levels, summary
@@ -118,9 +116,9 @@ def find_regular_repeats(pieces: list[summary.Excerpt]) -> Held | None:
     regular: list[Held] = []
     for values in whole:
         repeats, records = np.flatnonzero(values[1:] == values[:-1]), len(values) - 1
-        counts = np.zeros((_MAX_PERIOD + 1, 2), dtype=np.int64)
-        _count_phases(repeats, counts)
-        most, second = counts[3:].T
+        # The repeats in the fullest and the second fullest phase of each period
+        phases = (np.bincount(repeats % every, minlength=every) for every in periods)
+        second, most = np.array([np.partition(phase, -2)[-2:] for phase in phases]).T
         turns = records // periods
         share = (len(repeats) - most) / (records - turns)
         # Corrected for the number of phases and periods that are tested.
@@ -137,23 +135,6 @@ def find_regular_repeats(pieces: list[summary.Excerpt]) -> Held | None:
         return None
     every = int(np.median([of_piece.every for of_piece in regular]))
     return Held(every, float(np.median([of_piece.share for of_piece in regular])))
-
-
-@njit(cache=True, nogil=True)
-def _count_phases(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
-    """Count the repeats in the fullest and the second fullest phase of each period."""
-    phases = np.zeros(counts.shape[0], dtype=np.int64)
-    for every in range(3, counts.shape[0]):
-        phases[:every] = 0
-        for k in range(repeats.size):
-            phases[repeats[k] % every] += 1
-        most, second = 0, 0
-        for k in range(every):
-            if phases[k] > most:
-                most, second = phases[k], most
-            elif phases[k] > second:
-                second = phases[k]
-        counts[every, 0], counts[every, 1] = most, second
 
 
 def check_columns(

@@ -37,7 +37,6 @@ noise)."""
 
 _MIN_SHARE_LOG_TWICE = 0.1  # repeated samples for which the whole log is copied
 
-
 _FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
