@@ -182,8 +182,8 @@ def ranked(**changes: Any) -> tuple[Group, LimitLine]:
            "parts": [{"source": "N", "quantity": "gyro", "share": 0.75}],
            "reached_after": 7200.0}  # fmt: skip
     rows = RankingRow.rows_of(build("ranking", [row | changes]))
-    (one,) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
-    (group,) = one.groups
+    ((_, groups),) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
+    (group,) = groups
     (limit,) = group.limits
     return group, limit
 
@@ -220,10 +220,12 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
          "limit_verdict": "meets", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
         for margin in margins
     ]  # fmt: skip
-    (one,) = format_rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
-    assert [group.sensor for group in one.groups] == ["s3", "s2", "s1"]
+    ((_, groups),) = format_rankings(
+        [RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si"
+    )
+    assert [group.sensor for group in groups] == ["s3", "s2", "s1"]
 
 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
-    (one,) = format_rankings([], {"robot": ROBOT}, {}, "si")
-    assert (one.name, one.groups) == ("robot", [])
+    ((name, groups),) = format_rankings([], {"robot": ROBOT}, {}, "si")
+    assert (name, groups) == ("robot", [])
