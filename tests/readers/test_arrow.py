@@ -1,6 +1,5 @@
 from datetime import UTC, datetime
 from decimal import Decimal
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 
-from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.arrays import file as arrays
-from imubench_pipeline.readers.arrays.arrow import list_page_sizes
+from imubench_pipeline.readers.bounded import BoundError, run_bounded
 from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.tables.findings import RecordingError
 from tests.readers.array_files import (
     FIRST,
     STEP,
@@ -285,44 +284,15 @@ def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
         survives(path.with_name("damaged"), data, log(EVERY, time=STAMPED))
 
 
-def test_pages_beyond_the_bounds_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("kind", ["parquet", "feather"])
+def test_a_block_that_takes_more_memory_than_permitted_is_not_read(
+    tmp_path: Path, kind: str
 ) -> None:
-    # Row groups of 10 and of 50 rows: the larger page stands behind.
-    path = tmp_path / "log.parquet"
-    keys: dict[str, Any] = {"compression": "none", "use_dictionary": False}
-    table = pa.table({"wx": np.arange(50.0)})
-    with pq.ParquetWriter(path, table.schema, **keys) as out:
-        out.write_table(table.slice(0, 10))
-        out.write_table(table)
-    channels = {"gyro_x": {"column": "wx"}}
-    monkeypatch.setattr(bounds, "MAX_PAGE_BYTES", 399)
-    refused(
-        path, log(channels), r"pages unpack to 4\d\d bytes together; expected at most 399: write"
-    )
-    monkeypatch.setattr(bounds, "MAX_PAGE_BYTES", 500)
-    assert len(contents(path, log(channels))[0]["gyro_x"]) == 60
-    monkeypatch.setattr(bounds, "MAX_UNCHECKED_PAGES", 1)
-    refused(path, log(channels), "more than 1 pages; expected larger ones")
-
-
-@pytest.mark.parametrize("codec", ["none", "zstd", "snappy"])
-@pytest.mark.parametrize("version", ["1.0", "2.0"])
-def test_all_bytes_of_a_parquet_column_are_in_the_pages_that_are_found(
-    tmp_path: Path, codec: str, version: str
-) -> None:
-    values = np.random.default_rng(1).standard_normal(60_000)
-    table = pa.table(
-        {"few": np.round(values), "many": values, "gaps": pa.array(values, mask=values > 1)}
-    )
-    path = tmp_path / "log.parquet"
-    keys = {"compression": codec, "data_page_version": version, "write_page_checksum": True}
-    saved(path, table, row_group_size=25_000, write_batch_size=7000, data_page_size=1, **keys)
-    metadata = pq.read_metadata(path)
-    with path.open("rb") as file:
-        for group, column in product(range(3), range(3)):
-            about = metadata.row_group(group).column(column)
-            unpacked = list(list_page_sizes(file, about))
-            headers = about.total_uncompressed_size - sum(unpacked)
-            assert len(unpacked) >= 4 - (group == 2) * 2
-            assert 10 * len(unpacked) < headers < 150 * len(unpacked)
+    zeros = pa.table({"wx": np.zeros(1 << 23)})
+    keys: dict[str, Any] = {"compression": "zstd", "chunksize": len(zeros)}
+    if kind == "parquet":
+        keys = {"compression": "zstd", "use_dictionary": False, "data_page_size": 1 << 30}
+        keys |= {"write_batch_size": len(zeros), "row_group_size": len(zeros)}
+    path = saved(tmp_path / "a", zeros, kind, **keys)
+    with pytest.raises((BoundError, RecordingError), match=r"memory|malloc|allocate"):
+        run_bounded(60.0, 48 << 20, contents, path, log({"gyro_x": {"column": 1}}))

@@ -28,12 +28,6 @@ MAX_ARRAYS, MAX_FIELDS = 10_000, 1 << 14  # arrays of a file; columns of an arra
 MAX_BLOCK_BYTES = 1 << 26  # bytes of a block of records, which may be a single record
 MAX_CHUNK_BYTES = 1 << 28  # bytes of a chunk of each HDF5 column: they are unpacked whole
 MAX_CHUNKS = 1 << 17  # chunks of an HDF5 data set: the library takes 2 kB for each
-MAX_ARROW_BATCH = 1 << 28  # bytes of a compressed record batch, which is unpacked whole
-MAX_PAGE_BYTES = 1 << 28
-MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE = 1 << 17, 1 << 12
-"""Total unpacked bytes of the largest page of each column of a Parquet file; number of pages of any
-size, and least mean size of more pages, bytes."""
-
 MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64  # objects of an HDF5 file, and depth of nested groups
 MAX_NPY_HEADER = 10_000  # bytes; NumPy has the same limit, but reads a header first
 MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32  # of MATLAB 5; bytes of a name

@@ -8,7 +8,6 @@ import re
 from collections.abc import Mapping
 from typing import get_args
 
-from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 from imubench_pipeline.readers.other_formats import EXTENSION_MARKS
 from imubench_pipeline.registry import Hook
@@ -69,10 +68,7 @@ _DECLARED = (
         name="matlab",
         title="MATLAB file",
         endings=(".mat",),
-        signature=Signature(
-            begins=(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
-            tells=lambda begin: parse_header(begin[:HEADER_BYTES]) is not None,
-        ),
+        signature=Signature(begins=(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")),
         settings=("variable",),
         code=_load_matlab,
         extra="hdf5",

@@ -1,4 +1,4 @@
-"""NumPy, MATLAB 5 and Feather."""
+"""NumPy and MATLAB 5."""
 
 from __future__ import annotations
 
@@ -6,12 +6,7 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from tests.readers.hostile.attack import FIRST, MIB, Attack, file
 
@@ -86,44 +81,6 @@ def long_names() -> bytes:
     return matlab(matrix(STRUCTURE, b"s", fields(60_000, b"n" * 60_000, body)))
 
 
-def batch(folder: Path, rows: int, said: int | None = None) -> Path:
-    """Write a batch of zeros; ``said``: MiB that its one buffer is said to unpack to."""
-    path = folder / "log.arrow"
-    table = pa.record_batch({"wx": np.zeros(rows)})
-    options = pa.ipc.IpcWriteOptions(compression="zstd")
-    with pa.ipc.new_file(str(path), table.schema, options=options) as out:
-        out.write_batch(table)
-    if said is not None:
-        data, true = path.read_bytes(), (8 * rows).to_bytes(8, "little")
-        assert data.count(true) == 1
-        path.write_bytes(data.replace(true, (said * MIB).to_bytes(8, "little")))
-    return path
-
-
-_PAGES_HAVE_A_LIMIT = int(pa.__version__.partition(".")[0]) >= 23
-"""And one of 20,000 rows, where nothing is said."""
-
-
-def parquet(*groups: int, rows_of_page: int = 1 << 30) -> Callable[[Path], Path]:
-    """Return what writes zeros, in row groups of so many, each of one page."""
-
-    def write(folder: Path) -> Path:
-        path = folder / "log.parquet"
-        schema = pa.schema([("wx", pa.float64())])
-        with pq.ParquetWriter(
-            path, schema, compression="zstd", use_dictionary=False, write_statistics=False,
-            # Whether a page is full is asked after each batch.
-            write_batch_size=min(rows_of_page, max(groups)),
-            data_page_size=1 if rows_of_page < max(groups) else (1 << 31) - 1,
-            **({"max_rows_per_page": rows_of_page} if _PAGES_HAVE_A_LIMIT else {}),
-        ) as out:  # fmt: skip
-            for rows in groups:
-                out.write_table(pa.table({"wx": np.zeros(rows)}), row_group_size=rows)
-        return path
-
-    return write
-
-
 CORRUPT = "corrupt data, or cut short"
 ARRAYS = {
     "a header of 800 MB": Attack(
@@ -150,26 +107,5 @@ ARRAYS = {
         "more than 10000 arrays",
         "is a cell array",
         FIRST,
-    ),
-    "a batch that is said to have 8 GiB": Attack(
-        lambda folder: batch(folder, 1_000_000, 8192),
-        "a compressed record batch unpacks to 8589934592 bytes",
-        channels=FIRST,
-    ),
-    "a page of 256 MiB after a short one": Attack(
-        parquet(1000, 256 << 17),
-        "pages unpack to 268435465 bytes together; expected at most 268435456",
-        channels=FIRST,
-    ),
-    "131073 pages": Attack(
-        parquet((1 << 17) + 1, rows_of_page=1), "more than 131072 pages", channels=FIRST
-    ),
-    "a batch of 256 MiB": Attack(
-        lambda folder: batch(folder, 32 * MIB), "^read: 33554432$", "^listed: ", FIRST
-    ),
-    "a batch of more": Attack(
-        lambda folder: batch(folder, 32 * MIB + 1),
-        "a compressed record batch unpacks to 268435464 bytes",
-        channels=FIRST,
     ),
 }

@@ -1,4 +1,4 @@
-"""MATLAB files: version 7.3, which is HDF5, 5 (-v6, -v7) and 4 (-v4), all streamed.
+"""MATLAB files: version 7.3, which is HDF5, and 5 (-v6, -v7), both streamed.
 
 A column is a number, the column of a matrix as MATLAB shows it, counted from 1; or the name of a
 variable that is a vector. ``variable`` names the matrix; a field of a structure is ``imu/gyro``.
@@ -21,7 +21,6 @@ import numpy as np
 
 from imubench_pipeline.readers.arrays import hdf5, table
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
 _MAX_CLASS_LENGTH = 64
@@ -36,22 +35,19 @@ _COMPLEX_FAULT = "holds complex numbers; expected numbers: save real() of it"
 
 
 class MatlabFile(ArrayFile):
-    """A MATLAB file of version 7.3, 5 or 4."""
+    """A MATLAB file of version 7.3 or 5."""
 
     def tables(self, stack: ExitStack) -> Iterable[table.Table]:
         """Describe every variable."""
         if h5py.is_hdf5(self.path):
             return _list_variables_of_7(stack.enter_context(h5py.File(self.path, "r")))
         with self.path.open("rb") as file:
-            begin = file.read(max(HEADER_BYTES, _HEADER_5_BYTES))
-        order = _BYTE_ORDERS.get(begin[126:_HEADER_5_BYTES])
+            begin = file.read(_HEADER_5_BYTES)
+        order = _BYTE_ORDERS.get(begin[126:])
         if order is not None and struct.unpack(f"{order}H", begin[124:126])[0] >> 8 == _VERSION:
             return _list_variables_of_5(self.path)
-        if parse_header(begin[:HEADER_BYTES]) is not None:
-            return _list_variables_of_4(self.path)
         raise table.UnusableError(
-            "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
-            "-v7.3"
+            "not a MATLAB file of version 5 or 7.3, or its beginning is damaged; save it with -v7.3"
         )
 
 
@@ -80,26 +76,6 @@ def _list_variables_of_7(file: h5py.File) -> Iterator[table.Table]:
             elif kind not in _NUMERIC_CLASSES:
                 data_set.fault = _OBJECT_FAULT
         yield data_set
-
-
-def _list_variables_of_4(path: Path) -> Iterator[table.Table]:
-    """Yield the variables of a file."""
-    start, size = 0, path.stat().st_size
-    with path.open("rb") as file:
-        while start < size:
-            file.seek(start)
-            header = parse_header(file.read(HEADER_BYTES))
-            if header is None:
-                raise _make_damaged_error("no header of a variable of version 4", start)
-            begin, end = start + header.begin, start + header.begin + header.size
-            if end > size:
-                raise _make_truncated_error(end, size)
-            if header.fault is not None:
-                yield table.UnsupportedArray(header.name, header.fault)
-            else:
-                about = header.name, header.shape, header.dtype
-                yield table.StreamedArray(*about, True, lambda: path.open("rb"), begin, False)
-            start = end
 
 
 # --------------------------------------------------------------------------------- version 5
