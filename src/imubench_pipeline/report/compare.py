@@ -48,8 +48,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
-    asked = site.requirements
-    windows = [each.static_window for each in asked.values() if each.static_window]
+    windows = [each.static_window for each in site.requirements.values() if each.static_window]
     window = [*windows, site.settings["settings"]["error_budget"]["static_window"]][0]
     errors = {}
     for error in _COMPARED_ERRORS:
@@ -78,7 +77,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
                         if row.requirement == name and row.decides
                     },
                 }
-                for name, requirement in asked.items()
+                for name, requirement in site.requirements.items()
             ],
             **together.page,
         },

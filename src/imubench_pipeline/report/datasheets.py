@@ -67,7 +67,6 @@ _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
 
 
 def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
-    """Return the interpretations of each printed figure."""
     return group_rows(
         rows, lambda r: (r.channel, r.quantity, r.printed, r.unit, r.kind, r.condition)
     )
@@ -89,7 +88,6 @@ def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
 
 
 DEPENDS = "depends on whether the density is one-sided"
-"""The verdict where the readings of a density differ."""
 
 
 def compare_sensors_with_datasheets(
@@ -201,13 +199,11 @@ def _format_percent(share: float | None) -> str:
 
 
 def _format_measured(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
-    """Return the measured value, and its 95 % limits below it."""
     value, interval = unit.estimate_texts(row.measured, row.lower, row.upper)
     return [value] if row.measured is None or interval == NO_VALUE else [value, interval]
 
 
 def _format_difference(row: DatasheetRow) -> list[str]:
-    """Return the difference, and its 95 % limits below it."""
     lower, upper = row.delta_lower, row.delta_upper
     if lower is None or upper is None:
         return [_format_percent(row.delta)]

@@ -95,7 +95,6 @@ def compute_margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
 
 
 Simulated = Mapping[tuple[str, str], bool]
-"""Whether a recording is simulated, by sensor and name."""
 
 _NAMES = {
     "attitude": "attitude (tilt)",
@@ -227,7 +226,6 @@ def _expected(row: ErrorRow, system: System) -> str:
 
 
 def _interval(row: ErrorRow, system: System) -> str:
-    """Return the limits of the error of a row, in the unit of the error."""
     if row.sigma is None or row.lower is None or row.upper is None:
         return numbers.NO_VALUE
     if not _is_sensible(row, row.sigma):

@@ -60,7 +60,6 @@ METHOD_STYLES = {
 }
 
 Look = dict[str, Any]
-"""Keyword arguments of Matplotlib for the look of a line or marker."""
 
 TERM_LOOKS: dict[str, Look] = {
     "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
@@ -71,7 +70,6 @@ TERM_LOOKS: dict[str, Look] = {
     "R": {"color": "#7A4B3A", "linestyle": (0, (8, 2, 1, 2))},
     "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
 }
-"""Colour and dash of each term in all figures of Matplotlib."""
 
 SUM_LOOK: Look = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
 
@@ -83,7 +81,6 @@ TERM_NAMES = {
     quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
     for quantity, words in _QUANTITY_WORDS.items()
 }
-"""Standard names of the terms, by quantity and symbol of the term."""
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:

@@ -20,7 +20,6 @@ Json = dict[str, Any]
 """Data of a page for its scripts."""
 
 FOREST = (*COMPARED, "B", "T_B")
-"""The parameters that are drawn across sensors."""
 
 _SPECTRUM_POINTS = 80  # points of the curve of a term in a spectrum
 _COMPARED_MODEL_POINTS = 24  # points of the curve of a model in a comparison of channels

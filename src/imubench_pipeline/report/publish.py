@@ -166,7 +166,6 @@ def _make_compact_json(value: Any) -> str:
 
 _SETTINGS_FILE = "settings.json"
 _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
-"""Settings without which there are no pages."""
 _PAGE_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (

@@ -368,7 +368,6 @@ def _describe_values(channel: ChannelView, system: System) -> str:
 
 
 def _compare_deviations(rows: Sequence[estimates.ModelSampleRow], channel: str) -> str:
-    """Return the standard deviations of the simulated samples relative to the log in words."""
     own = {row.of: row for row in rows if row.channel == channel and row.what == "deviation"}
     log = own.get("log")
     widths = [(of, own[of].mean) for of in ("before", "after") if of in own]

@@ -13,7 +13,6 @@ Found = tuple[str, str, str, str]
 
 
 Search = Callable[[Site], Iterable[Found]]
-"""Returns further entries."""
 
 _ADDED: Hook[Search] = Hook("search")
 

@@ -156,7 +156,6 @@ def _choose_recording(
 
 
 def _describe_card(view: RecordingView, system: System) -> Mapping[str, object]:
-    """Return the recording of a card, and the quantities that it shows, with a picture of each."""
     drawn = {key: [one for one in view.channels() if one.quantity == key] for key in QUANTITY_NAMES}
     quantities = [
         (key, QUANTITY_NAMES[key], draw_picture(channels, system))
@@ -167,7 +166,6 @@ def _describe_card(view: RecordingView, system: System) -> Mapping[str, object]:
 
 
 def _list_missing(own: Sequence[RecordingView]) -> list[str]:
-    """Return a line for each sensor whose axes are not all in the recordings."""
     static = [view for view in own if view.static]
     shown = {name for view in static for name in view.channel_names}
     named = {row.channel for view in static for row in view.findings if row.channel}

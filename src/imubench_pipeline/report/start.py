@@ -96,11 +96,10 @@ def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
     if not rows:
         return None
     drawn: list[float | None] = []
-    for deciding in rows.values():
-        drawn += [deciding.logged_margin, deciding.corrected_margin]
-        drawn += [deciding.margin, deciding.noise_margin]
-        drawn += [deciding.likely_margin] if deciding.verdict == "meets_if" else []
-        drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
+    for each in rows.values():
+        drawn += [each.logged_margin, each.corrected_margin, each.margin, each.noise_margin]
+        drawn += [each.likely_margin] if each.verdict == "meets_if" else []
+        drawn += compute_margin_limits(each) if each.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
     apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
@@ -355,7 +354,6 @@ def _group_findings(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
 
 
 def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
-    """Yield the ranking for each requirement, with a summary in sentences."""
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
     for name, groups in format_rankings(rows, site.requirements, simulated, site.system):

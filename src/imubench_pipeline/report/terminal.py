@@ -32,7 +32,6 @@ from imubench_pipeline.words.verdicts import used_doubts_text
 R = TypeVar("R", bound=OfRecordingRow)
 
 About = Mapping[tuple[str, str], RecordingRow]
-"""The row of the table ``recordings`` of each sensor and recording."""
 
 _NAME_FOLDS_AT, _GAP = 16, 2  # of tables, columns of the terminal
 TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
@@ -279,7 +278,6 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
 def _parameter_lines(
     quantity: str, rows: Sequence[ParameterRow], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
-    """Return the header, and a line per channel with a column per parameter."""
     symbols = select_symbols(rows)
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel = group_rows(rows, lambda row: (row.sensor, row.recording, row.channel))

@@ -284,7 +284,6 @@ def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
 
 
 def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
-    """Return a digest of the rows of each recording in all tables."""
     digests: dict[Name, hashlib._Hash] = {}
     for table_name in BY_RECORDING:
         table = tables[table_name]

@@ -110,8 +110,6 @@ class Faults:
 
 
 class _Record(BaseModel):
-    """A step that failed, in this run or before."""
-
     step: str
     sensor: str
     recording: str | None = None

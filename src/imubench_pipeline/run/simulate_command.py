@@ -297,7 +297,6 @@ def _profiles(
 
 
 def _section(path: Path, key: str) -> Any:
-    """Return the value of a key in a YAML file, or the whole file."""
     content = read_yaml(path)
     return content.get(key, content) if isinstance(content, dict) else content
 

@@ -89,7 +89,6 @@ Form = Annotated[Formula | FileForm, Field(discriminator="form")]
 
 
 def _form(value: Any) -> Any:
-    """Return a single quantity as a constant."""
     return {"form": "constant", "value": value} if isinstance(value, (str, int, float)) else value
 
 

@@ -369,7 +369,6 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[model.TemperatureRo
 
 
 def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[model.LowPassRow]:
-    """Yield the rows of the table ``low_pass``: none where a band was asked for."""
     low_pass = fit.frame.low_pass
     if low_pass is None:
         return

@@ -93,7 +93,6 @@ def _plain(value: Any) -> Any:
 
 
 def _not_finite(table: pa.Table) -> str:
-    """Describe the first cell of a table that is NaN or infinite; empty if there is none."""
     for name, column in zip(table.column_names, table.columns, strict=True):
         if pa.types.is_floating(column.type):
             finite = pc.is_finite(column)  # null where there is no value
