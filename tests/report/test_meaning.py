@@ -51,14 +51,14 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    (shown,) = format_rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
-    assert [(g.rank, g.sensor, g.stated) for g in shown.groups] == [
+    ((_, shown),) = format_rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
+    assert [(g.rank, g.sensor, g.stated) for g in shown] == [
         ("1", "good", "meets the limits"),
         ("2", "poor", "fails"),
         ("–", "gyro", "not enough data"),
     ]
-    assert [group.simulated for group in shown.groups] == [True, False, False]
-    heading, position = shown.groups[1].limits
+    assert [group.simulated for group in shown] == [True, False, False]
+    heading, position = shown[1].limits
     assert (heading.sigma.unit, position.allowed.unit) == ("°", "m")
     # The bias from 10 s at rest, held for 100 s: N sqrt(t^2 / W) against N sqrt(t), known to 10 %.
     assert heading.sigma == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.2g} °"
@@ -71,9 +71,9 @@ def test_verdict_groups_have_the_doubts_of_their_logs() -> None:
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     marks = (DoubtMark("r", "knocks", ("gyro_x",)),)
     doubted = [replace(row, doubts=marks if row.sensor != "good" else ()) for row in table]
-    (shown,) = format_rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
+    ((_, shown),) = format_rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
     # Of the third nothing is known, and the reason says why.
-    assert [group.doubts for group in shown.groups] == ["", "knocks in gyro x", ""]
+    assert [group.doubts for group in shown] == ["", "knocks in gyro x", ""]
 
 
 def test_a_budget_names_its_sources_and_what_is_missing() -> None:
@@ -182,8 +182,8 @@ def ranked(**changes: Any) -> tuple[Group, LimitLine]:
            "parts": [{"source": "N", "quantity": "gyro", "share": 0.75}],
            "reached_after": 7200.0}  # fmt: skip
     rows = RankingRow.rows_of(build("ranking", [row | changes]))
-    (one,) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
-    (group,) = one.groups
+    ((_, groups),) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
+    (group,) = groups
     (limit,) = group.limits
     return group, limit
 
@@ -220,10 +220,12 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
          "limit_verdict": "meets", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
         for margin in margins
     ]  # fmt: skip
-    (one,) = format_rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
-    assert [group.sensor for group in one.groups] == ["s3", "s2", "s1"]
+    ((_, groups),) = format_rankings(
+        [RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si"
+    )
+    assert [group.sensor for group in groups] == ["s3", "s2", "s1"]
 
 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
-    (one,) = format_rankings([], {"robot": ROBOT}, {}, "si")
-    assert (one.name, one.groups) == ("robot", [])
+    ((name, groups),) = format_rankings([], {"robot": ROBOT}, {}, "si")
+    assert (name, groups) == ("robot", [])

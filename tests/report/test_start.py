@@ -37,16 +37,16 @@ def said(*rows: dict[str, Any], simulated: bool = False) -> tuple[str, list[str]
     """Return the answer, and the lines below it."""
     table = RankingRow.rows_of(build("ranking", rows))
     of = {(one.sensor, "r"): simulated for one in table}
-    (ranking,) = format_rankings(table, {"robot": ROBOT}, of, "practical")
+    ((_, groups),) = format_rankings(table, {"robot": ROBOT}, of, "practical")
     views = [
         SimpleNamespace(sensor=one.sensor, static=True, name="r",
                         row=SimpleNamespace(duration=7200.0), recommended=lambda: ["gyro_x"])
         for one in table
     ]  # fmt: skip
     site: Any = SimpleNamespace(names=NAMES, views=views)
-    ranked = [group for group in ranking.groups if group.row.rank]
-    answer = start._answer(site, ranking.groups, ranked)
-    lines = list(start._details(site, ranking.groups, ranked))
+    ranked = [group for group in groups if group.row.rank]
+    answer = start._answer(site, groups, ranked)
+    lines = list(start._details(site, groups, ranked))
     return answer, [Markup(escape(line)).striptags() for line in lines]
 
 

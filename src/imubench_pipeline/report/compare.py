@@ -22,7 +22,7 @@ from imubench_pipeline.report.payload import Arrays, Json, pack_styles
 from imubench_pipeline.report.practical import choose_unit, format_temperature, list_units_by_size
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words import verdicts
@@ -48,11 +48,8 @@ def _make_context(site: Site) -> Mapping[str, object]:
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
-    requirements = [
-        (name, Requirement.model_validate(declared))
-        for name, declared in site.settings["requirements"].items()
-    ]
-    windows = [each.static_window for _, each in requirements if each.static_window]
+    asked = site.requirements
+    windows = [each.static_window for each in asked.values() if each.static_window]
     window = [*windows, site.settings["settings"]["error_budget"]["static_window"]][0]
     errors = {}
     for error in _COMPARED_ERRORS:
@@ -81,7 +78,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
                         if row.requirement == name and row.decides
                     },
                 }
-                for name, requirement in requirements
+                for name, requirement in asked.items()
             ],
             **together.page,
         },

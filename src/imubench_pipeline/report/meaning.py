@@ -12,7 +12,7 @@ from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
-from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers, verdicts
 
@@ -162,29 +162,17 @@ class Group:
         return self.row.sensor
 
 
-@dataclass(frozen=True)
-class Ranking:
-    """The sensors in their order for a requirement."""
-
-    name: str
-    requirement: Requirement
-    groups: Sequence[Group]
-
-
 def format_rankings(
-    rows: Sequence[RankingRow],
-    requirements: Mapping[str, Any],
-    simulated: Simulated,
-    system: System,
-) -> Iterator[Ranking]:
-    """Yield the ranking for each requirement; ``requirements``: text from the plan."""
-    for name, declared in requirements.items():
-        own = (row for row in rows if row.requirement == name)
-        by_sensor = group_rows(own, lambda row: row.sensor)
+    rows: Sequence[RankingRow], requirements: Iterable[str], simulated: Simulated, system: System
+) -> Iterator[tuple[str, list[Group]]]:
+    """Yield the name of each requirement, and the sensors in their order for it."""
+    by_requirement = group_rows(rows, lambda row: row.requirement)
+    for name in requirements:
+        by_sensor = group_rows(by_requirement.get(name, ()), lambda row: row.sensor)
         groups = [_group(limits, simulated, system) for limits in by_sensor.values()]
         # By rank, then by margin; sensors without a rank come last.
         groups.sort(key=lambda group: (group.row.rank or 10**6, -(group.row.margin or 0.0)))
-        yield Ranking(name, Requirement.model_validate(declared), groups)
+        yield name, groups
 
 
 def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -> Group:

@@ -14,7 +14,6 @@ from imubench_pipeline.navigation.suitability import Abilities
 from imubench_pipeline.navigation.verdicts import compact
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.tables.keys import group_rows
 
 
@@ -23,8 +22,7 @@ def make_models(site: Site) -> str:
     settings = site.settings.get("models")
     if not settings:
         return "null"
-    requirements = validate_requirements(site.settings["requirements"])
-    packed = [compact.pack_requirement(*one) for one in requirements.items()]
+    packed = [compact.pack_requirement(*one) for one in site.requirements.items()]
     temperature = group_rows(site.rows(TemperatureRow), lambda row: (row.sensor, row.recording))
     apart = list_excluded(view.row for view in site.views)
     sensors: dict[str, Any] = {}
@@ -53,7 +51,7 @@ def make_models(site: Site) -> str:
             "recordings": recordings,
             "demands": {
                 key: compact.pack_demands(requirement, price, has)
-                for key, requirement in requirements.items()
+                for key, requirement in site.requirements.items()
             },
         }
     listed = [one for one in packed if one]

@@ -8,20 +8,19 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.class_limits import read_grade_limits
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.report.palette import AXIS_STYLES
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.typing import Array
 from imubench_pipeline.words.numbers import number_text
 
 _WIDTH, _HEIGHT = 1920, 800
 _LEFT, _RIGHT, _TOP, _BOTTOM = 140, 1720, 60, 700
 _GRADE_FILLS = ("#ffffff", "#f4f5f6", "#eaecee", "#e0e3e5")
 _LINE_POINTS = 24  # of a model and of limits: more would not be seen
-Values = NDArray[np.float64]
 
 
 def draw_picture(views: Sequence[ChannelView], system: System) -> Markup:
@@ -32,7 +31,7 @@ def draw_picture(views: Sequence[ChannelView], system: System) -> Markup:
     x_range = math.log10(tau.min()) - 0.1, math.log10(tau.max()) + 0.1
     y_range = math.log10(adev.min()) - 0.5, math.log10(adev.max()) + 0.3
 
-    def places(x: Values, y: Values) -> str:
+    def places(x: Array, y: Array) -> str:
         with np.errstate(divide="ignore"):
             across = (np.log10(x) - x_range[0]) / (x_range[1] - x_range[0])
             up = (np.log10(y) - y_range[0]) / (y_range[1] - y_range[0])
@@ -86,7 +85,7 @@ def draw_picture(views: Sequence[ChannelView], system: System) -> Markup:
 def _draw_curves(
     views: Sequence[ChannelView],
     scale: float,
-    places: Callable[[Values, Values], str],
+    places: Callable[[Array, Array], str],
     text: Callable[[float, float, str, str], str],
 ) -> Iterator[str]:
     x = float(_LEFT)

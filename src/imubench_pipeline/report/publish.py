@@ -175,11 +175,9 @@ _SCRIPT_NAMES = (
     *("mine", "start"),
 )
 
-Progress = Callable[[str], None]
-
 
 def publish(
-    site: Site, folder: Path, say: Progress = lambda _: None, processes: int = 1
+    site: Site, folder: Path, say: Callable[[str], None] = lambda _: None, processes: int = 1
 ) -> list[str]:
     """Write the pages of the report whose data changed, and remove obsolete ones.
 

@@ -289,20 +289,20 @@ def trace_verdicts(
         if view.static
     ]
     simulated = {view.full_name: view.simulated for view in own}
-    requirements = site.settings["requirements"] if rows else {}
-    for ranking in meaning.format_rankings(own_rows, requirements, simulated, site.system):
-        name, requirement = ranking.name, ranking.requirement
+    requirements = site.requirements if rows else {}
+    for name, groups in meaning.format_rankings(own_rows, requirements, simulated, site.system):
+        requirement = requirements[name]
         about = {
             "name": name,
             "title": requirement.title,
             "asked": verdicts.requirement_text(requirement),
         }
-        if not ranking.groups:
+        if not groups:
             word, why = verdicts.SHORT_VERDICTS["not_enough_data"], explain_missing_rank(own)
             nothing = {"row": None, "verdict": "not_enough_data", "margins": ""}
             yield {**about, **nothing, "word": word, "why": why}
             continue
-        (group,) = ranking.groups
+        (group,) = groups
         row = group.row
         reasons = {limit.reason for limit in group.limits}
         judged = sum(r.rank is not None and r.decides for r in rows if r.requirement == name)

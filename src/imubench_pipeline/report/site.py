@@ -21,6 +21,7 @@ from imubench_pipeline.report.comparison import ComparedRecording, gather_record
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_first_units, list_page_units
 from imubench_pipeline.report.view import Name, RecordingView, gather_recordings
+from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
@@ -209,6 +210,11 @@ class Site:
     def names(self) -> dict[str, str]:
         """Vendor and model of each sensor."""
         return name_sensors(self.sensors, self.settings["sensors"])
+
+    @cached_property
+    def requirements(self) -> dict[str, Requirement]:
+        """The requirements of applications, by name."""
+        return validate_requirements(self.settings["requirements"])
 
     def is_sold(self, sensor: str) -> bool:
         """Return whether a sensor can be bought; True if it has no sensor file."""

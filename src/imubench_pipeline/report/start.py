@@ -25,7 +25,6 @@ from imubench_pipeline.report.meaning import (
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words import numbers, verdicts
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -91,43 +90,15 @@ class Cell:
         return bool(self.weak or self.doubts)
 
 
-@dataclass(frozen=True)
-class Column:
-    """A requirement."""
-
-    name: str
-    title: str
-    limits: Sequence[str]
-
-    @property
-    def short(self) -> str:
-        """The name in words."""
-        return self.name.replace("_", " ").capitalize()
-
-
-@dataclass(frozen=True)
-class Matrix:
-    """All sensors and requirements."""
-
-    answer: str  # the sensors to choose
-    evidence: str  # how sure it is
-    columns: Sequence[Column]
-    lines: Sequence[tuple[str, Sequence[Cell]]]  # by sensor, the best first
-    apart: Mapping[str, str]  # sensors that are not compared, and why
-    scale: Scale
-    legend: Sequence[tuple[Verdict, str, str]]  # verdict, its word and meaning
-
-
-def make_decision_matrix(site: Site) -> Matrix | None:
+def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
     """Return the matrix of a report; None if there are no requirements."""
-    requirements = site.settings["requirements"]
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
     drawn: list[float | None] = []
     for deciding in rows.values():
-        drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
-        drawn += [deciding.noise_margin]
+        drawn += [deciding.logged_margin, deciding.corrected_margin]
+        drawn += [deciding.margin, deciding.noise_margin]
         drawn += [deciding.likely_margin] if deciding.verdict == "meets_if" else []
         drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
@@ -142,7 +113,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
             _cell(row, scale)
             if (row := rows.get((name, sensor)))
             else Cell(name, sensor, "not_enough_data", reason=unranked[sensor])
-            for name in requirements
+            for name in site.requirements
         ]
         for sensor in site.sensors
         if sensor not in apart
@@ -155,29 +126,30 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
 
     columns, best = [], {}
-    for place, (name, declared) in enumerate(requirements.items()):
+    for place, (name, requirement) in enumerate(site.requirements.items()):
         cells = [cells[place] for cells in lines.values()]
         judged = [cell for cell in cells if cell.margin]
         first = max(judged, key=lambda cell: cell.order, default=None)
-        requirement = Requirement.model_validate(declared)
         limits = [
             f"{x.error.replace('_', ' ')} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
             for x in requirement.limits
         ]
-        columns.append(Column(name, requirement.title, limits))
-        best[columns[-1].short] = rows[name, first.sensor] if first else None
-    return Matrix(
-        verdicts.summary_text(best, site.names),
-        verdicts.evidence_summary_text(row for key, row in rows.items() if key[1] not in apart),
-        columns,
-        sorted(lines.items(), key=lambda line: order(line[0])),
-        apart,
-        scale,
-        [
+        short = name.replace("_", " ").capitalize()
+        columns.append({"name": name, "title": requirement.title, "short": short, "limits": limits})
+        best[short] = rows[name, first.sensor] if first else None
+    compared = (row for (_, sensor), row in rows.items() if sensor not in apart)
+    return {
+        "answer": verdicts.summary_text(best, site.names),
+        "evidence": verdicts.evidence_summary_text(compared),
+        "columns": columns,
+        "lines": sorted(lines.items(), key=lambda line: order(line[0])),
+        "apart": apart,
+        "scale": scale,
+        "legend": [
             (verdict, verdicts.SHORT_VERDICTS[verdict], verdicts.VERDICT_MEANINGS[verdict])
             for verdict in _VERDICTS
         ],
-    )
+    }
 
 
 def explain_missing_rank(own: Iterable[RecordingView]) -> str:
@@ -386,14 +358,13 @@ def _list_rankings(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the ranking for each requirement, with a summary in sentences."""
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
-    for ranking in format_rankings(rows, site.settings["requirements"], simulated, site.system):
-        groups = ranking.groups
+    for name, groups in format_rankings(rows, site.requirements, simulated, site.system):
         ranked = [group for group in groups if group.row.rank]
         yield {
-            "name": ranking.name,
-            "requirement": ranking.requirement,
+            "name": name,
+            "requirement": site.requirements[name],
             "groups": groups,
-            "asked": verdicts.requirement_text(ranking.requirement),
+            "asked": verdicts.requirement_text(site.requirements[name]),
             "answer": _answer(site, groups, ranked),
             "details": list(_details(site, groups, ranked)),
             "tied": {group.sensor: _name_tied(site, group) for group in groups},
@@ -435,7 +406,6 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
 
 
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
-    asked = site.settings["requirements"]
     for row in site.rows(NextStepRow)[:_STEPS]:
         yield {
             "sensor": row.sensor,
@@ -446,7 +416,7 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
             ),
             "text": numbers.sentence(row.text),
             "brief": numbers.sentence(verdicts.next_step_text(row, brief=True)),
-            "about": "; ".join(asked[name]["title"] for name in row.requirements),
+            "about": "; ".join(site.requirements[name].title for name in row.requirements),
         }
 
 

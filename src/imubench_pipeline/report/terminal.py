@@ -21,7 +21,6 @@ from imubench_pipeline.report import run_summary
 from imubench_pipeline.report.comparison import select_symbols
 from imubench_pipeline.report.meaning import Group, format_rankings
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
-from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers
@@ -231,22 +230,17 @@ def _listed(title: str, lines: Iterable[str]) -> Iterator[Text]:
 def _ranking_tables(
     rows: Sequence[RankingRow], requirement: str | None, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
-    # The title is neither known from the table nor printed.
-    asked = {
-        name: Requirement.model_construct(title=name, static_window="-", limits=())
-        for name in dict.fromkeys(row.requirement for row in rows)
-        if requirement in (None, name)
-    }
+    asked = [requirement] if requirement else dict.fromkeys(row.requirement for row in rows)
     simulated = {key: row.simulated for key, row in about.items()}
     limit = "limit" if requirement else "deciding limit"
     heads = ["", "sensor", "verdict", "error of allowed (1σ)", limit, "margin"]
-    for ranking in format_rankings(rows, asked, simulated, system):
+    for name, groups in format_rankings(rows, asked, simulated, system):
         lines = [
             line
-            for group in ranking.groups
+            for group in groups
             for line in _ranking_lines(group, every=requirement is not None)
         ]
-        yield fit_table(f"Ranking for {ranking.name}", heads, lines, width, names=1)
+        yield fit_table(f"Ranking for {name}", heads, lines, width, names=1)
         yield Text()
 
 

@@ -9,7 +9,6 @@ from functools import cache, cached_property, partial
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 from pandas.util import hash_pandas_object
 from scipy.special import chdtri
 
@@ -23,6 +22,7 @@ from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.keys import split_table
 from imubench_pipeline.tables.schemas import BY_RECORDING
+from imubench_pipeline.typing import Array
 
 Name = tuple[str, str]
 """Sensor and recording."""
@@ -56,26 +56,26 @@ class ChannelView:
     recording: str
     channel: str
     simulated: bool
-    tau: NDArray[np.float64]
-    adev: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
+    tau: Array
+    adev: Array
+    lower: Array
+    upper: Array
     rate: float = math.nan
     parameters: dict[str, list[estimates.ParameterRow]] = field(default_factory=dict)
     recommended: str = ""
-    reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
+    reconstruction: dict[str, dict[str, Array]] = field(default_factory=dict)
     scores: dict[str, estimates.ScoreRow] = field(default_factory=dict)
     datasheet: list[DatasheetRow] = field(default_factory=list)
     true_components: dict[str, list[estimates.SimulatedTruthRow]] = field(default_factory=dict)
     models: list[estimates.ModelRow] = field(default_factory=list)
     lines: list[estimates.LineRow] = field(default_factory=list)
-    spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    spectrum: dict[str, Array] = field(default_factory=dict)
     findings: list[FindingRow] = field(default_factory=list)
     fixed_bias: float | None = None
     temperature: dict[str, estimates.TemperatureRow] = field(default_factory=dict)
     low_pass: dict[str, estimates.LowPassRow] = field(default_factory=dict)
     deterministic: list[estimates.DeterministicRow] = field(default_factory=list)
-    compensated: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    compensated: dict[str, Array] = field(default_factory=dict)
     _models: dict[str, NoiseModel] = field(default_factory=dict)
 
     @property
@@ -111,7 +111,7 @@ class ChannelView:
         """Sensor and recording, and whether it is simulated."""
         return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
 
-    def bin_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bin_limits(self) -> tuple[Array, Array]:
         """Return the 95 % limits of the density of the bins, given the fit of the spectrum.
 
         A bin scatters as chi squared of its degrees of freedom over their number.
@@ -309,5 +309,5 @@ def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
     return {name: digest.hexdigest() for name, digest in digests.items()}
 
 
-def _read_floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
+def _read_floats(part: pa.Table, *columns: str) -> dict[str, Array]:
     return {name: np.asarray(part[name].to_numpy(), dtype=np.float64) for name in columns}
