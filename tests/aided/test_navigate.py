@@ -14,7 +14,6 @@ from imubench_pipeline.extensions.aided.navigate import (
     _is_consistent,
     collect_tunings,
     navigate,
-    scale_model,
 )
 from imubench_pipeline.extensions.aided.runs import Share
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
@@ -124,7 +123,7 @@ def test_tunings_are_what_is_known_of_the_sensor(folder: Path) -> None:
     gyro = MODELS["gyro"]
     assert found["likelihood"]["gyro_z"] == gyro
     assert found["curve"]["gyro_z"] == NoiseModel(N=gyro.N)
-    assert found["times_ten"]["gyro_z"] == scale_model(gyro, 10.0)
+    assert found["times_ten"]["gyro_z"] == gyro.scaled(10.0)
     assert found["times_ten"]["gyro_z"].K == pytest.approx(10.0 * gyro.K)
     # 0.01 deg/s one-sided, 10 deg/h at the lowest point of the curve, that is 0.664 B.
     right, wrong = found["datasheet"]["gyro_x"], found["datasheet_misread"]["gyro_x"]

@@ -4,7 +4,6 @@ from imubench_pipeline.extensions.exports.imu import (
     AxisNoise,
     ExportError,
     Imu,
-    inflate,
     split_axes,
 )
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
@@ -16,9 +15,9 @@ def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
         Q=1.0, N=2.0, B=3.0, T_B=4.0, K=5.0, R=-6.0, further=[GaussMarkov(7.0, 8.0)],
         sinusoids=[Sinusoid(9.0, 10.0)],
     )  # fmt: skip
-    assert inflate(model, 2.0) == NoiseModel(
-        Q=2.0, N=4.0, B=6.0, T_B=4.0, K=10.0, R=-12.0, further=[GaussMarkov(14.0, 8.0)],
-        sinusoids=[Sinusoid(18.0, 10.0)],
+    assert model.scaled(2.0) == NoiseModel(
+        Q=2.0, N=4.0, B=6.0, T_B=4.0, K=10.0, R=-12.0, further=(GaussMarkov(14.0, 8.0),),
+        sinusoids=(Sinusoid(18.0, 10.0),),
     )  # fmt: skip
 
 

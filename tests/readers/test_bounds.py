@@ -45,9 +45,9 @@ DEAR = (
     "1100 topics of 1000 fields",  # fields of fields without end
     "a topic of 10 MB",  # a connection whose number has 1 MB
 )
-"""Each takes a second or more to write or to refuse, or is refused for what another one is.
-Every day `test_npy.py`, `test_hdf5.py`, `test_rosbag.py` and `test_compressed.py` have such files
-that are small, beyond bounds that are low; and damaged chunks."""
+"""Each takes a second or more to write or to refuse, or is refused for what another one is. Every
+day `test_npy.py`, `test_hdf5.py`, `test_rosbag.py` and `test_compressed.py` have such files that
+are small, beyond bounds that are low; and damaged chunks."""
 
 LEFT = (*JUST_WITHIN, *DEAR)
 

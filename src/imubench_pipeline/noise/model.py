@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,6 +104,15 @@ class NoiseModel:
                 raise ValueError(f"{term} is no Gauss-Markov process")
             processes.append(term.gauss_markov)
         return processes
+
+    def scaled(self, factor: float) -> "NoiseModel":
+        """Return the model of a signal that is a factor larger; times do not change."""
+        return replace(
+            self,
+            **{name: getattr(self, name) * factor for name in ("Q", "N", "B", "K", "R")},
+            further=tuple(term.scaled(factor) for term in self.further),
+            sinusoids=tuple(line.scaled(factor) for line in self.sinusoids),
+        )
 
     def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
         """Return the two-sided power spectral density at frequencies in Hz, in squared SI units/Hz.

@@ -109,7 +109,7 @@ def collect_tunings(
     best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named = _make_printed_models(sensor, declared)
     lacking: dict[str, str] = {}
-    ten = {name: scale_model(estimate.model, _TENFOLD_FACTOR) for name, estimate in best.items()}
+    ten = {name: _scale_model(estimate.model, _TENFOLD_FACTOR) for name, estimate in best.items()}
     named |= {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
     named |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
     try:
@@ -145,22 +145,15 @@ def collect_tunings(
     return found, lacking
 
 
-def scale_model(model: NoiseModel, factor: float) -> NoiseModel:
-    """Return the model of a signal that is a factor larger; a ramp and lines are left out."""
-    return NoiseModel(
-        Q=model.Q * factor,
-        N=model.N * factor,
-        B=model.B * factor,
-        T_B=model.T_B,
-        K=model.K * factor,
-        further=tuple(term.scaled(factor) for term in model.further),
-    )
+def _scale_model(model: NoiseModel, factor: float = 1.0) -> NoiseModel:
+    """Return the model of a signal that is a factor larger, without a ramp and lines."""
+    return replace(model.scaled(factor), R=0.0, sinusoids=())
 
 
 def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
     """Return the models of a method without ramp and lines, which a filter cannot extrapolate."""
     return {
-        channel: scale_model(estimate.model, 1.0)
+        channel: _scale_model(estimate.model)
         for channel, own in every.items()
         for estimate in own
         if estimate.method == method
@@ -213,7 +206,7 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
     # A measured recording before a simulated one, the longest of several.
     for about, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
         best = read_recommended_estimates(folder / "parameters.parquet")
-        fitted = {name: scale_model(each.model, 1.0) for name, each in best.items()}
+        fitted = {name: _scale_model(each.model) for name, each in best.items()}
         if not fitted:
             continue
         rate = about.rate or 0.0

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from imubench_pipeline.extensions.exports import reasons as texts
 from imubench_pipeline.model.estimates import TemperatureRow
@@ -143,7 +142,7 @@ class AxisNoise:
         """Return the noise with all densities and amplitudes times a factor."""
         return replace(
             self,
-            model=inflate(self.model, factor),
+            model=self.model.scaled(factor),
             each={letter: axis.inflated(factor) for letter, axis in self.each.items()},
         )
 
@@ -207,12 +206,3 @@ class Imu:
             raise ExportError(
                 f"{self.sensor}: no estimate of {' and '.join(missing)}, which this program needs"
             )
-
-
-def inflate(model: NoiseModel, factor: float) -> NoiseModel:
-    """Return a model with all densities and amplitudes times a factor; times stay."""
-    names = ("Q", "N", "B", "K", "R")
-    scaled: dict[str, Any] = {name: getattr(model, name) * factor for name in names}
-    further = [term.scaled(factor) for term in model.further]
-    lines = [line.scaled(factor) for line in model.sinusoids]
-    return replace(model, **scaled, further=further, sinusoids=lines)

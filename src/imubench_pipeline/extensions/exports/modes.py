@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from imubench_pipeline.extensions.exports import reasons as texts
-from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu, inflate
+from imubench_pipeline.extensions.exports.imu import AxisNoise, ExportError, Imu
 from imubench_pipeline.extensions.exports.in_use import InUseNoise
 from imubench_pipeline.extensions.exports.mapping import as_walk
 from imubench_pipeline.extensions.exports.programs import Program
@@ -128,7 +128,7 @@ def _raise_to(imu: Imu, target: Program, floors: Densities, factor: float, words
 
     def raise_axis(axis: AxisNoise, quantity: str) -> AxisNoise:
         least_N, least_K = floors.get(quantity, (0.0, 0.0))
-        model = inflate(axis.model, factor)
+        model = axis.model.scaled(factor)
         notes = list(axis.notes)
         if least_K > 0.0 and target.family == "N+K":
             mapped = as_walk(model, imu.horizon, imu.rate)
