@@ -42,7 +42,6 @@ DECIMATION = 64  # stride of the stored phase of the whole log
 SECTION_SAMPLES = 1 << 16  # samples that are summed together, so that their phase fits the L2 cache
 FULL_PHASE_SAMPLES = 1 << 17  # with fully stored phase, for the noise type of short clusters
 MIN_DECIMATED_SAMPLES = 1 << 16  # shorter logs use fully overlapping clusters
-_PIECE_SAMPLES = 1 << 20  # of a long block that are copied together
 _LEVELS_IN_SECTION = 6  # strides 1, 2 ... 32 inside a section
 _POINTS_OF_LONGEST_PAIR = 4 * MIN_STARTS_PER_CLUSTER  # at any stride, of a pair of clusters
 _OVERLAP_SAMPLES = _POINTS_OF_LONGEST_PAIR * DECIMATION // 2
@@ -109,18 +108,23 @@ class OctaveSums:
         if self.received < FULL_PHASE_SAMPLES:
             self._begin.append(block[: FULL_PHASE_SAMPLES - self.received].copy())
         self.received += len(block)
-        for begin in range(0, len(block), _PIECE_SAMPLES):
-            self._rest = np.concatenate((self._rest, block[begin : begin + _PIECE_SAMPLES]))
-            ready = (len(self._rest) - _OVERLAP_SAMPLES) // SECTION_SAMPLES
-            if ready > 0:
-                self._sum(ready)
-                self._rest = self._rest[ready * SECTION_SAMPLES :].copy()
+        rest = self._rest
+        ready = max(0, (len(rest) + len(block) - _OVERLAP_SAMPLES) // SECTION_SAMPLES)
+        used = ready * SECTION_SAMPLES - len(rest)
+        if ready:
+            # Only sections that begin in the remainder are copied, with the samples they need.
+            heads = min(ready, -(-len(rest) // SECTION_SAMPLES))
+            end = heads * SECTION_SAMPLES + _OVERLAP_SAMPLES - len(rest)
+            head = np.concatenate((rest, block[:end]))
+            body = block[heads * SECTION_SAMPLES - len(rest) :] if ready > heads else block[:0]
+            self._sum(head, heads, body, ready)
+        self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
 
     def finish(self) -> None:
         """Sum the remaining samples."""
         sections = -(-len(self._rest) // SECTION_SAMPLES)
         if sections:
-            self._sum(sections)
+            self._sum(self._rest, sections, self._rest[:0], sections)
         self._rest = self._rest[:0]
         if self._filled < len(self.theta):
             self.theta[self._filled] = self._at
@@ -149,16 +153,18 @@ class OctaveSums:
             for of_short, of_long in zip(self._sums, long, strict=True)
         ]
 
-    def _sum(self, sections: int) -> None:
-        """Sum the short clusters that begin in sections of the rest, and store their phase."""
-        samples = self._rest
+    def _sum(self, head: Samples, heads: int, body: Samples, sections: int) -> None:
+        """Sum the short clusters that begin in sections of head, then body; store their phase."""
         if not self._filled:
-            self._bias = average_finite(samples[:SECTION_SAMPLES])
+            self._bias = average_finite((head if heads else body)[:SECTION_SAMPLES])
+        # Converted to one type, so that the kernel is compiled only once.
+        head, body = head.view(), body.astype(head.dtype, copy=False).view()
+        head.flags.writeable = body.flags.writeable = False
 
         def work(low: int, high: int) -> tuple[NDArray[Any], ...]:
             room = self._rooms.get()
             try:
-                return self._sections(low, high, samples, room)
+                return self._sections(low, high, head, heads, body, room)
             finally:
                 self._rooms.put(room)
 
@@ -166,7 +172,8 @@ class OctaveSums:
         for row in sums:
             self._sums += row  # one by one, so that the order does not depend on the blocks
         # At the end of the log the last section may be shorter.
-        points = -(-min(sections * SECTION_SAMPLES, len(samples)) // DECIMATION)
+        samples = len(head) if heads == sections else sections * SECTION_SAMPLES
+        points = -(-min(sections * SECTION_SAMPLES, samples) // DECIMATION)
         filled = slice(self._filled, self._filled + points)
         before = np.cumsum(np.concatenate(([self._at], totals)))
         edges += before[:-1, None]
@@ -180,7 +187,7 @@ class OctaveSums:
         self._filled += points
 
     def _sections(
-        self, low: int, high: int, samples: Samples, room: Buffers
+        self, low: int, high: int, head: Samples, heads: int, body: Samples, room: Buffers
     ) -> tuple[Array, Array, Array, Integers]:
         """Sum the clusters that begin in sections ``low`` to ``high``.
 
@@ -195,18 +202,20 @@ class OctaveSums:
         counts = np.zeros((number, points + 1 if self._holes else 0), dtype=np.int64)
         whole = np.zeros(number, dtype=np.bool_)
         common = (self._bias, self._grid, theta)
-        _sum_sections(low, samples, *common, tail, sums, totals, edges, whole)
+        _sum_sections(low, head, heads, body, *common, tail, sums, totals, edges, whole)
         for section in range(number):
-            begin = (low + section) * SECTION_SAMPLES
-            own = samples[begin : begin + SECTION_SAMPLES + _OVERLAP_SAMPLES]
+            in_head = low + section < heads
+            begin = (low + section - (0 if in_head else heads)) * SECTION_SAMPLES
+            end = begin + SECTION_SAMPLES + _OVERLAP_SAMPLES
+            samples = (head if in_head else body)[begin:end]
             of_section = (*common, sums[section], edges[section])
-            if len(own) < SECTION_SAMPLES + _OVERLAP_SAMPLES:
-                totals[section], whole[section] = _sum_end(own, *of_section)
+            if len(samples) < SECTION_SAMPLES + _OVERLAP_SAMPLES:
+                totals[section], whole[section] = _sum_end(samples, *of_section)
             if self._holes and whole[section]:
-                counts[section] = np.minimum(np.arange(points + 1) * DECIMATION, len(own))
+                counts[section] = np.minimum(np.arange(points + 1) * DECIMATION, len(samples))
             elif self._holes:
                 totals[section] = _sum_present(
-                    own, *of_section, self._enough, present, counts[section]
+                    samples, *of_section, self._enough, present, counts[section]
                 )
         return sums, totals, edges, counts
 
@@ -214,7 +223,9 @@ class OctaveSums:
 @njit(cache=True, nogil=True)
 def _sum_sections(
     low: int,
-    samples: Samples,
+    head: Samples,
+    heads: int,
+    body: Samples,
     bias: float,
     grid: Grid,
     theta: Array,
@@ -228,9 +239,13 @@ def _sum_sections(
     offsets = np.empty(_NUMBER_OF_LANES + 1)
     for section in range(totals.size):
         begin = (low + section) * SECTION_SAMPLES
-        own = samples[begin : min(begin + SECTION_SAMPLES + _OVERLAP_SAMPLES, samples.size)]
-        if own.size == SECTION_SAMPLES + _OVERLAP_SAMPLES:
-            _integrate_lanes(own, bias, theta, tail, offsets)
+        source = head
+        if low + section >= heads:
+            begin -= heads * SECTION_SAMPLES
+            source = body
+        samples = source[begin : min(begin + SECTION_SAMPLES + _OVERLAP_SAMPLES, source.size)]
+        if samples.size == SECTION_SAMPLES + _OVERLAP_SAMPLES:
+            _integrate_lanes(samples, bias, theta, tail, offsets)
             totals[section] = offsets[_NUMBER_OF_LANES]
             whole[section] = np.isfinite(offsets[_NUMBER_OF_LANES] + tail[_OVERLAP_SAMPLES])
             if whole[section]:
