@@ -49,7 +49,7 @@ class Curve(AllanCurve):
         return None if self.channel is None else quantity_of(self.channel)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the deviation with 95 % limits."""
+        """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
         axes: Axes = drawing.get_axes(ax)
         drawing.draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
         return axes

@@ -56,12 +56,21 @@ def choose_deviation_unit(quantity: str | None) -> Unit:
 
 
 def draw_curves(axes: "Axes", curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
-    """Draw Allan deviations with their 95 % limits."""
+    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
     unit = choose_deviation_unit(quantity)
     looks = cycle(assign_sensor_styles([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
     _format_axes(axes, unit)
+    # The slopes -1/2 of white noise and +1/2 of a random walk, through the ends of the first curve.
+    curve = next(iter(curves.values()))
+    limits = axes.get_xlim(), axes.get_ylim()
+    last = max(int(np.searchsorted(curve.cluster_size, curve.samples / 9.0)) - 1, 0)
+    for place, factor in ((0, 0.1**0.5), (last, 10.0**0.5)):
+        tau, level = curve.tau[place], curve.deviation[place] * unit.per_si
+        line = (tau, level), (10.0 * tau, factor * level)
+        axes.axline(*line, color="0.6", linewidth=0.8, linestyle=":", zorder=1.0)
+    axes.set(xlim=limits[0], ylim=limits[1])
 
 
 def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
