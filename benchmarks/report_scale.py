@@ -29,12 +29,12 @@ from imubench_pipeline.extensions.figures.figures import list_drawings
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import make_site, publish
 from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory
 
-COMPARED = ("error_growth", "drawn_deviations")  # tables of recordings that a page reads
 PROJECT = Path(__file__).parents[1]
 SENSORS = 20
 FIRST_NIGHT = date(2026, 1, 1)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.report.compare import COMPARE
+from imubench_pipeline.report.compare import COMPARE, KEPT
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.tables.files import build, write
 from tests.report.browser.made import publish_some
@@ -34,7 +34,7 @@ ROWS = {
 
 def put(results: Path, sensor: str, recording: str) -> None:
     names = {"sensor": sensor, "recording": recording}
-    for table in ROWS:
+    for table in KEPT:
         rows = [names | row for row in ROWS[table]]
         if table == "drawn_deviations":
             rows = [row | {"draw": None if row["draw"] < 0 else row["draw"]} for row in rows]

@@ -36,7 +36,7 @@ from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
-from imubench_pipeline.report.glossary import find_term, read_glossary
+from imubench_pipeline.report.glossary import UnknownTermError, find_term, read_glossary
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
 from imubench_pipeline.units import convert_from_si, convert_to_si
@@ -141,9 +141,9 @@ def test_a_key_in_two_sections_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_an_unknown_term_is_an_error_that_names_close_ones() -> None:
-    with pytest.raises(LookupError, match=r"'alan_deviation' is not .* allan_deviation"):
+    with pytest.raises(UnknownTermError, match=r"'alan_deviation' is not .* allan_deviation"):
         read_glossary()["alan_deviation"]
-    with pytest.raises(LookupError):
+    with pytest.raises(UnknownTermError):
         find_term("splendid", "verdict")
     assert "alan_deviation" not in read_glossary()
 

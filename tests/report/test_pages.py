@@ -7,6 +7,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from imubench_pipeline import registry, report
@@ -15,6 +16,7 @@ from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.pages import ENTRIES, list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.view import BY_RECORDING
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import shipped_sensors
 from imubench_pipeline.steps.shortlist import list_shortlist
@@ -27,6 +29,18 @@ pytestmark = pytest.mark.usefixtures("small_report")
 
 
 EXTENSIONS = [f"imubench_pipeline.extensions.{one.name}" for one in installed_extensions()]
+
+
+class Tables(dict[str, pa.Table]):
+    """The tables of a site, which note who is read."""
+
+    def __init__(self, tables: dict[str, pa.Table]) -> None:
+        super().__init__(tables)
+        self.read: set[str] = set()
+
+    def __getitem__(self, name: str) -> pa.Table:
+        self.read.add(name)
+        return super().__getitem__(name)
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +61,20 @@ def whole() -> Site:
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.file)
-def test_every_page_has_its_template_and_content(entry: Entry, whole: Site) -> None:
-    assert entry.exists(whole), "the site of this test lacks what the page shows"
-    page = entry.page(whole)
+def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Site) -> None:
+    tables = Tables(dict(whole.tables))
+    noting = replace(whole, tables=tables)
+    assert entry.exists(noting), "the site of this test lacks what the page shows"
+    of_recordings = BY_RECORDING if entry.views(noting) else ()
+    page = entry.page(noting)
+    # What tells which recordings there are, and their names, is in the key of every page.
+    assert noting.views and noting.existing and noting.names
+    tables.read.clear()
+    noting._rows.clear()
     assert page.context()
-    publishing.make_templates(whole.system).get_template(page.template)
+    undeclared = tables.read - {*entry.shown_tables, *of_recordings}
+    assert not undeclared, "the page would not be written again when these change"
+    publishing.make_templates(noting.system).get_template(page.template)
 
 
 def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:

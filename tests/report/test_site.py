@@ -9,7 +9,7 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.report.sensor import describe_change
 from imubench_pipeline.report.site import Page, Site, name_sensors
-from imubench_pipeline.report.start import summarise_recordings
+from imubench_pipeline.report.start import START, summarise_recordings
 from tests.report.tables import (
     KNOWN,
     MODEL,
@@ -183,6 +183,7 @@ def test_code_is_part_of_the_key_of_every_page() -> None:
     other.code = "0123"
     assert one.common != other.common
     assert one.key_of("x") != other.key_of("x")
+    assert START.page(one).key != START.page(other).key
 
 
 def test_parts_of_a_key_do_not_run_together() -> None:

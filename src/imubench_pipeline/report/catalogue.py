@@ -187,5 +187,7 @@ DATASHEETS = Entry(
     file="datasheets.html",
     title="Datasheets",
     context=_make_context,
+    tables=("catalogue", "coverage"),
     exists=lambda site: bool(site.rows(CoverageRow)),
+    views=lambda site: site.views,
 )

@@ -28,23 +28,25 @@ from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import duration_text, number_text
 
+KEPT = ("error_growth", "drawn_deviations")
+"""The tables of each recording that the page uses, besides the joined tables."""
+
 _SOURCE_COLUMNS = tuple(field.name for field in fields(ErrorSource))
 _COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
-    # The static recordings can be compared; of many, the latest.
-    views = site.select_compared([view for view in site.views if view.static])
+    views = _select_recordings(site)
     together = Comparison(site.compared(views), site.names)
     arrays, channels = together.arrays, together.channels
     recordings = []
     for view in views:
-        folder = site.results / "recordings" / view.sensor / view.name
-        drawn = dict(_pack_draws(_read_columns(folder / "drawn_deviations.parquet"), arrays))
+        kept = {table: _read_columns(_make_path(site, view, table)) for table in KEPT}
+        drawn = dict(_pack_draws(kept["drawn_deviations"], arrays))
         for channel in channels:
             if (channel["sensor"], channel["recording"]) == view.full_name:
                 channel["drawn"] = drawn.get(channel["channel"])
-        growth = _pack_growth(_read_columns(folder / "error_growth.parquet"), arrays)
+        growth = _pack_growth(kept["error_growth"], arrays)
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
@@ -88,6 +90,15 @@ def _describe_verdict(row: RankingRow) -> str:
     margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
     margins.append(verdicts.other_margins_text(row))
     return ", ".join(filter(None, [verdicts.SHORT_VERDICTS[row.verdict], *margins]))
+
+
+def _select_recordings(site: Site) -> list[RecordingView]:
+    """Return the static recordings, which can be compared; of many, the latest."""
+    return site.select_compared([view for view in site.views if view.static])
+
+
+def _make_path(site: Site, view: RecordingView, table: str) -> Path:
+    return site.results / "recordings" / view.sensor / view.name / f"{table}.parquet"
 
 
 def _read_columns(path: Path) -> Mapping[str, Any]:
@@ -216,5 +227,10 @@ COMPARE = Entry(
     file="compare.html",
     title="Side by side",
     context=_make_context,
+    tables=("ranking",),
+    views=_select_recordings,
+    files=lambda site: (
+        _make_path(site, view, table) for view in _select_recordings(site) for table in KEPT
+    ),
     exists=lambda site: any(view.static for view in site.views),
 )

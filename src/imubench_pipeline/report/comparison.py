@@ -74,14 +74,15 @@ def make_parameter_cell(
     unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     rows = [row for row in rows if row.status != "absent"] or rows
-    terms = [term for term in rows[0].model.split("+") if term in ("F", "GM")] if rows else []
+    named = rows[0].model.split("+") if len(rows) > 1 else ()
+    terms = dict(enumerate((term for term in named if term in ("F", "GM")), start=1))
     parts = [
         _part(
             row.value,
             None if row.status == "absent" else row.lower,
             row.upper,
             "" if row.status == "ok" else row.status,
-            terms[row.component - 1] if len(rows) > 1 else "",
+            terms.get(row.component, ""),
         )
         for row in rows
     ]

@@ -47,18 +47,25 @@ class Term:
     action: str | None = None  # advice, of a finding alone
 
 
+class UnknownTermError(KeyError):
+    """A term that is missing in the glossary."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class _Glossary(dict[str, Term]):
     def __missing__(self, key: str) -> Term:
         close = difflib.get_close_matches(str(key), self, n=3)
         hint = f"; did you mean {' or '.join(close)}?" if close else ""
-        raise LookupError(f"{key!r} is not in {_FILE.name}{hint}")
+        raise UnknownTermError(f"{key!r} is not in {_FILE.name}{hint}")
 
 
 @lru_cache(maxsize=1)
 def read_glossary() -> dict[str, Term]:
     """Return all terms by key, in the order of the file; do not change them: they are cached.
 
-    An unknown key raises a LookupError with similar terms. Raises ConfigError if the file
+    An unknown key raises an UnknownTermError with similar terms. Raises ConfigError if the file
     cannot be used, or a key is in two sections.
     """
     terms = _Glossary()
@@ -77,6 +84,6 @@ def find_term(value: str, kind: str = "") -> Term:
 
     ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
     (of a printed figure or recording), ``line``, ``axis``, ``rate_from``, ``recording`` (status).
-    Raises LookupError if the glossary does not have it.
+    Raises UnknownTermError if the glossary does not have it.
     """
     return read_glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

@@ -44,8 +44,17 @@ _MAX_DETAILED_RECORDINGS = 12
 def make_sensor_page(site: Site, sensor: str) -> Page:
     """Return the page of a sensor."""
     own = [view for view in site.views if view.sensor == sensor]
+    key = site.key_of(
+        *(view.key for view in own),
+        *(view.device_page for view in own),
+        [row for row in site.rows(comparisons.PooledRow) if row.sensor == sensor],
+        [row for row in site.rows(comparisons.RepeatabilityRow) if row.sensor == sensor],
+        [row for row in site.rows(comparisons.RankingRow) if row.decides or row.sensor == sensor],
+        [row for row in site.rows(comparisons.CoverageRow) if row.sensor == sensor],
+        site.looks[sensor],
+    )
     context = partial(_make_sensor_context, site, sensor, own)
-    return Page(site.sensor_page(sensor), "sensor.html.jinja", "", context)
+    return Page(site.sensor_page(sensor), "sensor.html.jinja", key, context)
 
 
 def _make_sensor_context(

@@ -58,6 +58,7 @@ SHORTLIST = Entry(
     file="shortlist.html",
     title="Before buying",
     context=_make_context,
+    tables=("coverage", "shortlist"),
     exists=lambda site: bool(site.rows(ShortlistRow)),
 )
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ class Page:
 
     path: str  # below the folder of the report
     template: str
-    key: str  # digest of its data: it is made again only if it changes; empty: at each call
+    key: str  # digest of its content: the page is written again only if it changes
     context: Callable[[], Mapping[str, object]]  # of the template
 
     @property
@@ -72,19 +73,37 @@ class Entry:
     file: str  # its name; its template is called so, too, with ``.jinja``
     title: str
     context: "Callable[[Site], Mapping[str, object]]"  # of the template
+    # the joined tables that it shows: it is written again if one of them changes
+    tables: tuple[str, ...] = ()
+    # returns the recordings that it shows: the same if any of their rows change
+    views: "Callable[[Site], Sequence[RecordingView]]" = lambda _: ()
+    # returns the files of recordings that it shows: the same
+    files: "Callable[[Site], Iterable[Path]]" = lambda _: ()
     exists: "Callable[[Site], bool]" = lambda _: True  # returns whether a report has it
     about: str = ""  # what it shows, for the page of experiments; empty: it is in the menu
     place: int = 0  # among the pages of extensions
 
+    @property
+    def sections(self) -> "list[Section]":
+        """The sections that extensions add."""
+        return [section for section in _SECTIONS.objects() if section.page == self.file]
+
+    @property
+    def shown_tables(self) -> set[str]:
+        """The joined tables that it shows, including its sections."""
+        return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
+
     def page(self, site: "Site") -> Page:
         """Return the page of a report."""
+        shown = (site.tables[table].to_pylist() for table in sorted(self.shown_tables))
+        kept = (path.read_bytes() for path in self.files(site) if path.is_file())
+        key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
 
         def context() -> Mapping[str, object]:
-            sections = (section for section in _SECTIONS.objects() if section.page == self.file)
-            made = ((section.template, section.context(site)) for section in sections)
+            made = ((section.template, section.context(site)) for section in self.sections)
             return {**self.context(site), "sections": [one for one in made if one[1] is not None]}
 
-        return Page(self.file, f"{self.file}.jinja", "", context)
+        return Page(self.file, f"{self.file}.jinja", key, context)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +113,7 @@ class Section:
     page: str  # the file of its `Entry`
     template: str  # gets the result of `context` as `section`
     context: "Callable[[Site], Any]"  # returns None if the section is omitted
+    tables: tuple[str, ...] = ()  # further joined tables that it shows
 
 
 _SECTIONS: Hook[Section] = Hook("sections")

@@ -467,6 +467,8 @@ START = Entry(
     file="index.html",
     title="Comparison",
     context=_start,
+    tables=("failures", "files", "pooled", "ranking", "next_steps", "drift", "coverage"),
+    views=lambda site: site.views,
 )
 
 RECORDINGS = Entry(
@@ -474,4 +476,5 @@ RECORDINGS = Entry(
     title="Recordings",
     about="every recording with its status, length, rate and warnings",
     context=_recordings,
+    views=lambda site: site.views,
 )

@@ -99,6 +99,7 @@ NAVIGATION = Entry(
     title="Navigation",
     about="filters on simulated drives with outages of GNSS: which tuning, which sensor",
     context=_make_context,
+    tables=("navigation", "ranking"),
     exists=lambda site: bool(site.rows(NavigationRow)),
     place=1,
 )

@@ -391,14 +391,18 @@ def _make_context(site: Site) -> Mapping[str, object]:
     }
 
 
+def _select_recordings(site: Site) -> list[RecordingView]:
+    return [*select_turned(site), *select_calibrated(site), *select_predicted(site)]
+
+
 EARTH_RATE_PAGE = Entry(
     file="earth_rate.html",
     title="Earth’s rate",
     about="a gyro turned between north and south: how well it senses the Earth’s rate",
     context=_make_context,
-    exists=lambda site: bool(
-        select_turned(site) or select_calibrated(site) or select_predicted(site)
-    ),
+    tables=("ranking",),
+    views=_select_recordings,
+    exists=lambda site: bool(_select_recordings(site)),
     place=4,
 )
 NOT_FOUND = Section(

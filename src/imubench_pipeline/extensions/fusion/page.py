@@ -71,6 +71,7 @@ FUSION = Entry(
     title="Fusion",
     about="how many cheap sensors match one good sensor",
     context=_make_context,
+    tables=("fusion", "grades"),
     exists=lambda site: bool(site.rows(FusionRow) or site.rows(GradeRow)),
     place=2,
 )
@@ -249,6 +250,9 @@ BOARDS = Entry(
     title="Boards",
     about="boards with several sensors: one by one and together",
     context=_make_boards_context,
+    views=lambda site: [
+        view for name in site.settings["boards"] for view in _select_recordings(site, name)
+    ],
     exists=lambda site: bool(site.settings.get("boards")),
     place=3,
 )

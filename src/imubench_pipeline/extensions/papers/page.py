@@ -32,23 +32,32 @@ def _make_context(site: Site) -> dict[str, Any]:
     }
 
 
+def _select_recordings(site: Site) -> list[RecordingView]:
+    """Return the recordings whose curves are drawn."""
+    names = dict.fromkeys(
+        (one.sensor, one.recording) for paper in read_papers() for one in paper.drawn
+    )
+    views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
+    return [views[name] for name in names if name in views]
+
+
 PAPERS_PAGE = Entry(
     place=5,
     file="papers.html",
     title="Papers",
     about="what three papers print, with the computed values",
     context=_make_context,
+    tables=("published", "accuracy"),
+    views=_select_recordings,
     exists=lambda site: bool(site.rows(PublishedRow)),
 )
 
 
 def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
     """Return the curves that reproduce figures of the papers, as far as they exist."""
-    names = {(one.sensor, one.recording) for paper in read_papers() for one in paper.drawn}
     channels = {
         (*view.full_name, channel.channel): (view, channel)
-        for view in site.views
-        if view.full_name in names and view.simulated and not view.left_out
+        for view in _select_recordings(site)
         for channel in view.channels()
     }
     return [
@@ -144,6 +153,7 @@ READING = Section(
     page="theory.html",
     template="reading.html.jinja",
     context=lambda site: describe_reading(site.rows(AccuracyRow)) or None,
+    tables=("accuracy",),
 )
 
 
