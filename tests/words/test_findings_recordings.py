@@ -102,7 +102,6 @@ EXAMPLES: list[tuple[str, FindingData]] = [
     ("", files.IncompleteFirstRecord("a.csv", 2, 1, "3,4")),
     ("", files.NotRecords("a.csv", 1, 2, "x,y")),
     ("", files.RestartedLog("a.csv", 2, 1)),
-    ("", files.LeapSecond("a.csv", 1)),
     ("", files.DamagedMessage("a.bag", 1, "/imu", is_left_out=False)),
     ("", files.DamagedMessage("a.bag", 3, "/imu", is_left_out=True)),
     ("", files.NotMeasured("a.bag", 6, "/imu", "linear_acceleration")),

@@ -30,14 +30,9 @@ _ADVICE = (
 )
 _ARROW_EMPTY_FILE = "Empty CSV file"
 _ARROW_OPEN_QUOTE = "out of sync"
-_SECOND_SIXTY = re.compile(r"\d:\d\d:60(?!\d)")
 _ARROW_ROW = re.compile(r"Row #(\d+)")
 _ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
 _ARROW_VALUE = re.compile(r"invalid value '(.*)'|zone offset in '(.*?)'", re.DOTALL)
-
-
-class _SecondSixtyError(Exception):
-    """A stamp in a leap second, which pyarrow cannot read."""
 
 
 class CsvFile(LogFile):
@@ -71,20 +66,7 @@ class CsvFile(LogFile):
                     f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
                     f"{name}; mend 'column' of one of them in the sensor file"
                 )
-        before, rows = list(self.findings), 0
-        try:
-            for batch in self._batches(layout, columns, time):
-                rows += len(batch)
-                yield batch
-        except _SecondSixtyError:
-            # Read again, since pyarrow has no leap seconds, and skip the records already given.
-            self.findings[:] = before
-            time = text_stamps.TextTime(self, layout, as_text=True)
-            for batch in self._batches(layout, columns, time):
-                again = min(rows, len(batch))
-                rows -= again
-                if again < len(batch):
-                    yield batch.after(again)
+        yield from self._batches(layout, columns, time)
 
     def _batches(
         self, layout: TextLayout, columns: Mapping[str, int], time: text_stamps.TextTime | None
@@ -109,9 +91,6 @@ class CsvFile(LogFile):
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
         self._report(layout, records)
-        if time is not None and time.leap_seconds:
-            number = time.leap_seconds
-            self.note(files.LeapSecond(self.path.name, number), number, "note")
 
     def _parts(
         self,
@@ -156,10 +135,6 @@ class CsvFile(LogFile):
                 if lines.error is not None:
                     raise lines.error from None
                 if _ARROW_EMPTY_FILE not in str(error):
-                    if time is not None and time.types.get(time.position) != pa.string():
-                        value = _ARROW_VALUE.search(str(error))
-                        if value is not None and _SECOND_SIXTY.search(value[1] or ""):
-                            raise _SecondSixtyError from None
                     raise self._explained(error, fault, layout, time) from None
             shifted = records.damaged > 0 and self.log.time is None
             if (finding := lines.zeros(records.damaged, shifted=shifted)) is not None:

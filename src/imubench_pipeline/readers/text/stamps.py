@@ -55,9 +55,6 @@ class TextStamps:
         # Without a date, stamps wrap to 0 at midnight.
         self.dated = "d" in self._fields or "j" in self._fields
         self._zoned: bool | None = None
-        self.leap_seconds = 0
-        # The last stamp, before leap seconds are added, and whether it is in one.
-        self._last: tuple[int, bool] = (0, False)
 
     def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return ns since 1970 or midnight, and a mask of the stamps that are present.
@@ -78,24 +75,7 @@ class TextStamps:
             text = texts[int(row)].as_py()
             if not is_missing(text):
                 raise StampError(int(row), text)
-        if "S" in self._fields:
-            leap = np.asarray(pc.fill_null(pc.equal(fields.field("S"), "60"), False))
-            time[sound] = self._counted(time[sound], leap[sound])
         return time, sound
-
-    def _counted(self, time: NDArray[np.int64], leap: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return stamps that advance through leap seconds."""
-        # Second 60 is read as second 0 of the next minute; it counts if that second is repeated.
-        if not len(time):
-            return time
-        last, in_leap = self._last
-        before = np.concatenate(([last], time[:-1]))
-        if not self.dated:
-            before %= DAY
-        ended = np.concatenate(([in_leap], leap[:-1])) & ~leap & (time <= before)
-        seconds = self.leap_seconds + np.cumsum(ended)
-        self._last, self.leap_seconds = (int(time[-1]), bool(leap[-1])), int(seconds[-1])
-        return time + seconds * 10**9
 
     def _composed(self, fields: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         def figures(name: str, default: int) -> NDArray[np.int64]:
@@ -127,7 +107,7 @@ class TextStamps:
         first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
         following = (months + 1).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
         sound = (month >= 1) & (month <= 12) & (day >= 1) & (first + day <= following)
-        sound &= (hour < 24) & (minute < 60) & (second <= 60)
+        sound &= (hour < 24) & (minute < 60) & (second <= 60)  # 59.9996 s may be rounded
         sound &= (year > 1700) & (year < 2200)  # otherwise ns overflow
         days = first + day - 1 + figures("j", 1) - 1
         seconds = days * 86_400 + hour * 3600 + minute * 60 + second
@@ -217,12 +197,12 @@ class TextTime:
     """Converts the stamps of a text log to seconds.
 
     ``types``: for pyarrow, by column position; a separate column of dates comes first.
-    ``expected``: for messages. ``as_text``: ISO 8601 is not read by pyarrow.
+    ``expected``: for messages.
     """
 
     _text: TextStamps | None = None
 
-    def __init__(self, file: LogFile, layout: TextLayout, *, as_text: bool = False) -> None:
+    def __init__(self, file: LogFile, layout: TextLayout) -> None:
         assert file.log.time is not None  # constructed only for logs with stamps
         source = file.log.time
         self._source = source
@@ -230,19 +210,19 @@ class TextTime:
         self.position = positions[-1]
         stamps = [row[self.position] for row in layout.rows if self.position < len(row)]
         present = [stamp for stamp in stamps if not is_missing(stamp)]
-        self.types = dict.fromkeys(positions, self._type(present, as_text=as_text))
+        self.types = dict.fromkeys(positions, self._type(present))
         daily = self._text is not None and not self._text.dated
         self._clock = Clock(file, DAY if daily else source.wraps, self._started)
         self.expected = f"a time stamp as {source.format or source.unit!r}"
         if present:
             self.expected += f", like {present[0]!r}"
 
-    def _type(self, stamps: list[str], *, as_text: bool) -> pa.DataType:
+    def _type(self, stamps: list[str]) -> pa.DataType:
         if self._source.format is None:
             # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
             whole = self._source.unit == "ns" and all(_INTEGER.fullmatch(s.strip()) for s in stamps)
             return pa.int64() if whole else pa.float64()
-        if self._source.format == "iso8601" and self._source.date is None and not as_text:
+        if self._source.format == "iso8601" and self._source.date is None:
             # pyarrow itself is much faster, but reads no decimal commas, and no spaces around the
             # stamp or before the zone.
             matches = [_ISO_STAMP.fullmatch(text) for text in stamps]
@@ -251,11 +231,6 @@ class TextTime:
                 return pa.timestamp("ns", "UTC" if zones.pop() else None)
         self._text = TextStamps(self._source.format)
         return pa.string()
-
-    @property
-    def leap_seconds(self) -> int:
-        """Number of leap seconds in stamps that were read as text."""
-        return 0 if self._text is None else self._text.leap_seconds
 
     def seconds(self, part: pa.RecordBatch) -> NDArray[np.float64]:
         """Return s since the first stamp of the file, NaN where missing; raise `StampError`."""

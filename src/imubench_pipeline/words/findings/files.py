@@ -310,16 +310,6 @@ class RestartedLog(base.FindingData, affects=base.NONE):
         )
 
 
-class LeapSecond(base.FindingData, affects=base.NONE):
-    """Time stamps that count leap seconds."""
-
-    file: str
-    seconds: int
-
-    def text(self, channel: str) -> str:
-        return f"{self.file}: the time stamps count {counted(self.seconds, 'leap second')}"
-
-
 class DamagedMessage(base.FindingData, affects=base.ALL, doubt="messages are damaged"):
     """Messages of a bag that do not match their type."""
 
