@@ -20,7 +20,6 @@ from pydantic import TypeAdapter
 
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.holes import FileWithoutHoles
-from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.tables import seals
 
 KNOWN = "log.json"  # the file of the evidence, beside `quality.json`
@@ -168,14 +167,6 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
         return None
     now = KnownFile.of(path)
     return replace(now, version=before.version) if now.sha256 == before.sha256 else None
-
-
-def plan_recording_versions(recording: Recording, results: Path) -> dict[str, str]:
-    """Return `plan_versions` of a recording; empty for a simulated one."""
-    if recording.simulated:
-        return {}
-    folder = results / "recordings" / recording.sensor / recording.name
-    return plan_versions(recording.path, folder)
 
 
 def digest_blocks(path: Path) -> str:

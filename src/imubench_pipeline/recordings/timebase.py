@@ -118,8 +118,8 @@ def fit_time_base(
         base = _assume_consecutive(stamps, track, stated, settings)
         if stated:
             return base
-        coarse = _describe_coarse_stamps(base.rate, 1.0 / (typical.other or interval))
-        return replace(base, findings=(*base.findings, coarse))
+        data = time_base.CoarseStamps(base.rate, 1.0 / (typical.other or interval))
+        return replace(base, findings=(*base.findings, find(data, "warning", base.rate)))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         if stated and known is None and not complete:  # many samples may be missing
             of_stated = fit_time_base(stamps, stated, settings, known=1.0 / stated)
@@ -131,7 +131,7 @@ def fit_time_base(
     findings = _describe_grid(track, exact)
     rate = 1.0 / exact
     if typical.other is not None and stated is None:
-        findings.append(_describe_coarse_stamps(rate, 1.0 / typical.other))
+        findings.append(find(time_base.CoarseStamps(rate, 1.0 / typical.other), "warning", rate))
     findings += _compare_rates(rate, stated, settings)
     findings += _find_drift(track, settings)
     if track.grid - track.rows > MIN_MISSING * track.grid:
@@ -208,11 +208,6 @@ def find_rate_changes(
 
 def _is_rate_of(stated: float | None, interval: float, settings: QualitySettings) -> bool:
     return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
-
-
-def _describe_coarse_stamps(rate: float, other: float) -> Finding:
-    """Return the finding about rounded stamps; ``other``: rate, Hz, if they are not rounded."""
-    return find(time_base.CoarseStamps(rate, other), "warning", rate)
 
 
 def _describe_grid(track: tracking.Track, interval: float) -> list[Finding]:

@@ -24,7 +24,7 @@ from imubench_pipeline.navigation.error_budget.in_use import state_figures
 from imubench_pipeline.navigation.suitability import read_abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.known_logs import plan_recording_versions
+from imubench_pipeline.recordings.known_logs import plan_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings import sensor as sensor_files
@@ -210,7 +210,9 @@ class Plan:
                     notes.check_gyro(log)
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
-            files = {} if self._stored else plan_recording_versions(recording, self.run.results)
+            folder = self.run.results / "recordings" / recording.sensor / recording.name
+            unread = self._stored or recording.simulated
+            files = {} if unread else plan_versions(recording.path, folder)
             return plan(log=log, notes=notes, files=files)
         except UnavailableSettingsError as error:
             return plan(unavailable=self._without_folders(str(error)))
