@@ -151,7 +151,7 @@ def test_terminal_shows_weak_evidence_corrected_verdicts_and_next_steps(
     )
     ranking = after(text, "Ranking for robot")
     for part in ("weak evidence: only one specimen", "meets the limits (margin 7.5)",
-                 "the gyro data in °/s, not rad/s"):  # fmt: skip
+                 "the gyro data read as °/s, not"):  # fmt: skip
         assert part in ranking
 
 

@@ -69,8 +69,8 @@ def test_a_printed_figure_has_one_verdict_however_it_is_read() -> None:
     (row,) = deltas(instability, instability | {"statistic": "plateau", "verdict": "not sure"})
     assert row["verdict"] == "as printed"
     assert [reading["as"] for reading in row["readings"]] == [
-        "if minimum of σ(τ)",
-        "if 0.664 B",
+        "by σ_min",
+        "by 0.664 B",
     ]
 
 

@@ -299,7 +299,7 @@ def test_a_channel_without_a_random_walk_says_so(read: dict[str, Read]) -> None:
     assert "K" not in answer.text
     assert page.naming("K is not in the model: the data do not support it; below 3 °/h/√h.", "li")
     (row,) = (one for one in page.naming("likelihood", "tr") if "recommended" in one.text)
-    assert re.search(r"below 3\s*not in the model", row.text)
+    assert re.search(r"below 3 \(95 %\)\s*not in the model", row.text)
 
 
 def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) -> None:

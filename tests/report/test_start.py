@@ -105,7 +105,7 @@ def test_a_verdict_that_a_corrected_unit_changes_is_said() -> None:
     assert lines[1:] == [
         "Not enough data: B (no data).",
         "B fails (margin 0.1) as logged; "
-        "meets the limits (margin 7) with the gyro data in °/s, not rad/s.",
+        "meets the limits (margin 7) with the gyro data read as °/s, not as rad/s.",
     ]
 
 
@@ -124,7 +124,7 @@ def test_where_no_sensor_can_be_ranked_none_is_the_best() -> None:
         ({"doubts": (DoubtMark("r", "motion"),)}, f"{DATA} Doubts: the sensor was moved."),
         (
             {"left_out": (DoubtMark("q", "suspicious_unit", ("gyro_z",)),)},
-            f"{DATA} Not used: q: the measurement unit of gyro z looks wrong.",
+            f"{DATA} Not used: q: the unit of measurement of gyro z looks wrong.",
         ),
         (
             {"recordings": 3, "specimens": 2, "spread": 0.1, "spread_of": "specimens",

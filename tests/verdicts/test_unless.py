@@ -36,7 +36,7 @@ def test_corrected_verdict_equals_verdict_in_the_right_unit() -> None:
         outcome = {"fails": "also fails", "meets": "meets the limits"}[true["verdict"]]
         assert words(row) == (
             f"fails (margin {row['logged_margin']:.3g}) as logged; {outcome} "
-            f"(margin {true['margin']:.3g}) with the gyro data in °/s, not rad/s"
+            f"(margin {true['margin']:.3g}) with the gyro data read as °/s, not as rad/s"
         )
     assert {row["corrected_verdict"] for row in rows} > {"fails"}
 
@@ -44,7 +44,7 @@ def test_corrected_verdict_equals_verdict_in_the_right_unit() -> None:
 def test_verdict_text_has_the_corrected_unit() -> None:
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
     assert rows[0]["verdict"] == "fails"
-    expected = "meets the limits (margin 7.5) with the gyro data in °/s, not rad/s"
+    expected = "meets the limits (margin 7.5) with the gyro data read as °/s, not as rad/s"
     assert words(rows[0]) == expected
     assert (rows[0]["corrected_verdict"], rows[0]["logged_verdict"]) == ("meets", None)
     quiet = [doubt("s", "r", "suspicious_unit", factor=DEGREES)]
@@ -59,7 +59,8 @@ def test_a_failure_that_a_unit_would_lift_may_leave_another_limit_open() -> None
     assert rows[0]["corrected_margin"] is None
     assert rows[0]["corrected_reasons"] == ["the recording has no accelerometer"]
     assert words(rows[0]) == (
-        "cannot be judged with the gyro data in °/s, not rad/s (the recording has no accelerometer)"
+        "cannot be judged with the gyro data read as °/s, not as rad/s "
+        "(the recording has no accelerometer)"
     )
 
 
@@ -92,7 +93,7 @@ def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
 
 @pytest.mark.parametrize(
     ("factor", "units"),
-    [(9.80665, "g, not m/s²"), (1 / 9.80665, "m/s², not g"), (1e-3, "mg, not g")],
+    [(9.80665, "g, not as m/s²"), (1 / 9.80665, "m/s², not as g"), (1e-3, "mg, not as g")],
 )
 def test_corrected_accelerometer_unit_changes_margin_and_text(factor: float, units: str) -> None:
     right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
@@ -101,4 +102,4 @@ def test_corrected_accelerometer_unit_changes_margin_and_text(factor: float, uni
     unit = [doubt("s", "r", "suspicious_unit", channel="accel_x", factor=factor)]
     rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], unit)
     assert rows[0]["corrected_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
-    assert words(rows[0]).endswith(f" with the accelerometer data in {units}")
+    assert words(rows[0]).endswith(f" with the accelerometer data read as {units}")

@@ -25,8 +25,8 @@ def test_a_doubt_is_a_sentence(code: str, channels: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("code", "channels", "text"),
     [
-        ("suspicious_unit", ("gyro_z",), "the measurement unit of gyro z looks wrong"),
-        ("suspicious_unit", (), "the measurement unit of the data looks wrong"),
+        ("suspicious_unit", ("gyro_z",), "the unit of measurement of gyro z looks wrong"),
+        ("suspicious_unit", (), "the unit of measurement of the data looks wrong"),
         ("motion", ("gyro_x",), "the sensor was moved"),
         ("truncated", ("gyro_x",), "truncated samples of gyro x"),
         ("channel_twice", ("gyro_x",), "gyro x is a copy of another channel"),

@@ -261,7 +261,7 @@ def test_evidence_is_weak_for_reasons() -> None:
     )
     assert weak("wide_interval") == "wide interval"
     marks = (DoubtMark("a", "motion", ("gyro_x",)), DoubtMark("a", "suspicious_unit", ("gyro_z",)))
-    assert weak("suspicious_unit", doubts=marks) == "the measurement unit of gyro z looks wrong"
+    assert weak("suspicious_unit", doubts=marks) == "the unit of measurement of gyro z looks wrong"
 
 
 @pytest.mark.parametrize("of", get_args(SpreadOf))
@@ -290,7 +290,7 @@ GYRO = UnitFactor("gyro", DEGREE)
         (corrected("meets", None), "meets the limits (margin 0.1) as logged"),
         (
             corrected(None, "meets", GYRO),
-            "meets the limits (margin 7.5) with the gyro data in °/s, not rad/s",
+            "meets the limits (margin 7.5) with the gyro data read as °/s, not as rad/s",
         ),
         (
             corrected("fails", "fails", UnitFactor("gyro", 1 / 17.5)),
@@ -299,8 +299,8 @@ GYRO = UnitFactor("gyro", DEGREE)
         ),
         (
             corrected("fails", "not_enough_data", GYRO, UnitFactor("accel", 2.0)),
-            "fails (margin 0.1) as logged; cannot be judged with the gyro data in °/s, "
-            "not rad/s, and the accelerometer data multiplied by 2",
+            "fails (margin 0.1) as logged; cannot be judged with the gyro data read as °/s, "
+            "not as rad/s, and the accelerometer data multiplied by 2",
         ),
     ],
 )

@@ -35,7 +35,7 @@ GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
 
 RADIAN = np.pi / 180.0
-REASON = "recording c is not used: the measurement unit of gyro x looks wrong"
+REASON = "recording c is not used: the unit of measurement of gyro x looks wrong"
 
 
 def put_log_times(path: Path, seed: int, factor: float) -> None:
@@ -202,11 +202,11 @@ def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
     assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
     report = project.results / "report"
     assert (
-        "Not used: c: the measurement unit of gyro x looks wrong"
+        "Not used: c: the unit of measurement of gyro x looks wrong"
         in (report / "index.html").read_text()
     )
     assert (
-        "not used (the measurement unit of gyro x looks wrong"
+        "not used (the unit of measurement of gyro x looks wrong"
         in (report / "recordings.html").read_text()
     )
     assert "Not used in comparisons" in (report / "recordings/one/c.html").read_text()

@@ -15,7 +15,7 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
 _STATISTIC_NAMES = dict.fromkeys(("adev_minimum", "plateau"), "bias instability")
 _STATISTIC_NAMES |= {"N": "N", "K": "K", "T_B": "T_B"}
-_STATISTIC_TEXTS = {"adev_minimum": "if minimum of σ(τ)", "plateau": "if 0.664 B"}
+_STATISTIC_TEXTS = {"adev_minimum": "by σ_min", "plateau": "by 0.664 B"}
 UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",

@@ -92,7 +92,7 @@ def make_templates(system: System) -> jinja2.Environment:
                 text = f"{number(value)}{mark}"
                 small = f"({limits})" if limits else ""
             else:
-                text, small = limits, f"{_explain_term(status)}"
+                text, small = limits and f"{limits} (95 %)", f"{_explain_term(status)}"
             text = f"{part['term']}: {text}" if part["term"] else text
             parts.append("<br>".join(filter(None, (text, small and f"<small>{small}</small>"))))
         none = " none" if cell["value"] is None else ""

@@ -25,7 +25,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "code": row.verdict,
             "word": SHORT_VERDICTS[row.verdict],
             "shortfalls": list(map(shortfall_text, row.shortfalls)),
-            "conditions": list(_list_conditions(row)),
+            "conditions": [*_list_conditions(row), *_list_gaps(row)],
             "parts": list(map(share_text, row.parts)),
             "origins": origins_text(row.parts),
             "name": names.get(row.sensor, row.sensor),
@@ -44,6 +44,10 @@ def _make_context(site: Site) -> Mapping[str, object]:
             for name, lines in boards.items()
         ]
     }
+
+
+def _list_gaps(row: ShortlistRow) -> Sequence[str]:
+    return row.reasons if row.verdict == "not_enough_data" else ()
 
 
 def _list_conditions(row: ShortlistRow) -> Iterator[str]:

@@ -198,7 +198,7 @@ def _make_unjudged_cell(row: RankingRow, scale: Scale) -> Cell:
         (words, *_place_margin(row, name, size, scale))
         for words, name, size in (
             ("as logged", "logged_margin", row.logged_margin),
-            ("if corrected", "corrected_margin", row.corrected_margin),
+            ("with the unit corrected", "corrected_margin", row.corrected_margin),
         )
         if size is not None
     ]

@@ -134,16 +134,16 @@ _FULL_SCALES = {"gyro": ("deg/s", "angular_rate"), "accel": ("g", "acceleration"
 
 _UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
     "gyro": (
-        (math.radians(1.0), "°/s, not rad/s"),
-        (math.degrees(1.0), "rad/s, not °/s"),
-        (1e-3 * math.degrees(1.0), "mrad/s, not °/s"),
-        (1e3 * math.radians(1.0), "°/s, not mrad/s"),
+        (math.radians(1.0), "°/s, not as rad/s"),
+        (math.degrees(1.0), "rad/s, not as °/s"),
+        (1e-3 * math.degrees(1.0), "mrad/s, not as °/s"),
+        (1e3 * math.radians(1.0), "°/s, not as mrad/s"),
     ),
     "accel": (
-        (STANDARD_GRAVITY, "g, not m/s²"),
-        (1.0 / STANDARD_GRAVITY, "m/s², not g"),
-        (1e-3, "mg, not g"),
-        (1e3, "g, not mg"),
+        (STANDARD_GRAVITY, "g, not as m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², not as g"),
+        (1e-3, "mg, not as g"),
+        (1e3, "g, not as mg"),
     ),
 }
 """Likely unit mistake for each factor that corrects the data."""
@@ -396,7 +396,7 @@ def corrected_text(row: comparisons.RankingRow) -> str:
             name, factor = SENSORS[each.quantity], each.factor
             for size, units in _UNIT_MISTAKES[each.quantity]:
                 if math.isclose(factor, size, rel_tol=1e-6):
-                    named.append(f"the {name} data in {units}")
+                    named.append(f"the {name} data read as {units}")
                     break
             else:
                 times, done = (1.0 / factor, "divided") if factor < 1.0 else (factor, "multiplied")

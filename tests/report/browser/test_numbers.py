@@ -149,9 +149,9 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
         "K is not in the model: the data do not support it; below 1.2 °/h/√h.",
     ]
     # 1e-7 rad/s/√s are 1.24 °/h/√h.
-    assert absent.inner_text().split("\n") == ["below 1.2", "not in the model"]
+    assert absent.inner_text().split("\n") == ["below 1.2 (95 %)", "not in the model"]
     unsure = tables.nth(2).locator("tr.recommended td.none")
-    assert unsure.inner_text().split("\n") == ["20 to 500", "not determined"]
+    assert unsure.inner_text().split("\n") == ["20 to 500 (95 %)", "not determined"]
     assert "± 10 % needs 10 h" in reader.page.locator("ul.untold").last.inner_text()
 
 

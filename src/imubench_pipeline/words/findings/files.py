@@ -150,7 +150,7 @@ class UnitContradicts(
     affects=frozenset(base.POWERS_OF_UNIT),
     unfit=True,
     scales=base.POWERS_OF_UNIT,
-    doubt="the measurement unit of {channels} contradicts the file",
+    doubt="the unit of measurement of {channels} contradicts the file",
 ):
     """Log and sensor file state different units."""
 

@@ -83,7 +83,7 @@ class SuspiciousUnit(
     affects=_OF_UNIT,
     unfit=True,
     scales=base.POWERS_OF_UNIT,
-    doubt="the measurement unit of {channels} looks wrong",
+    doubt="the unit of measurement of {channels} looks wrong",
 ):
     """Gravity, or the noise, is usual in another unit than the stated one."""
 
