@@ -23,7 +23,7 @@ from imubench_pipeline.estimators.curve_bias import compute_curve_figures
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
-from imubench_pipeline.settings.printed import Datasheet, PrintedFigure
+from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.words.reasons import datasheets as texts
 from imubench_pipeline.words.reasons.pools import status_reason
 
@@ -221,6 +221,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     1, with its least and largest value within both intervals. The tolerance is as in `deltas`.
     """
     figure = entry.figure
+    tau = f"τ = {figure.tau}" if figure and figure.tau else None  # of an Allan deviation
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
     row = Delta(
         quantity=entry.quantity,
@@ -228,7 +229,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         printed=entry.printed,
         unit=figure.unit if figure else None,
         kind=figure.kind if figure else None,
-        condition=_describe_condition(figure) if figure else None,
+        condition=", ".join(filter(None, (tau, figure.condition))) or None if figure else None,
         sidedness=entry.sidedness,
         comparable=entry.value,
         comparable_lower=entry.lower,
@@ -328,9 +329,3 @@ def _select_typical(printed: Sequence[Comparable], statistic: str) -> list[Compa
     with_value = [row for row in printed if row.statistic == statistic and row.value is not None]
     typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL_KINDS]
     return typical or with_value
-
-
-def _describe_condition(figure: PrintedFigure) -> str | None:
-    """Return the condition of a figure, with the averaging time of an Allan deviation."""
-    tau = figure.tau and f"τ = {figure.tau}"
-    return ", ".join(filter(None, (tau, figure.condition))) or None

@@ -159,13 +159,6 @@ class TableRow(_Attributes):
         return cls(**{**{name: getattr(source, name) for name in names}, **columns})
 
     @classmethod
-    def from_json(cls, values: Mapping[str, Any]) -> Self:
-        """Return a row from values as JSON has them: lists in place of tuples and structs."""
-        columns = [column for column in columns_of(cls) if column.name in values]
-        plain = {column.name: column.from_arrow([values[column.name]])[0] for column in columns}
-        return cls(**{**values, **plain})
-
-    @classmethod
     def rows_of(cls, content: pa.Table) -> list[Self]:
         """Return the rows of an Arrow table that has the columns of this class."""
         rows = [cls.__new__(cls) for _ in range(content.num_rows)]

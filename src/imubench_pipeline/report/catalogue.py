@@ -95,11 +95,14 @@ def _make_cell(row: CoverageRow, found: Sequence[CatalogueRow]) -> Json:
             )
     ends = {kind: ends[kind] for kind in get_args(Kind) if kind in ends}
     first = next(iter(ends.values()), [])
+    # Figures that cannot be converted, as printed, with their conditions.
+    akin = [f"{one.as_printed}{f', {one.condition}' * bool(one.condition)}"
+            for one in found if one.as_printed and not ends]  # fmt: skip
     return {
         "published": row.published,
         "parts": _list_ranges(ends),
         "value": max(map(abs, first), default=None),
-        "akin": "" if ends else "; ".join(filter(None, dict.fromkeys(map(_describe_akin, found)))),
+        "akin": "; ".join(dict.fromkeys(akin)),
         "sources": list(
             dict.fromkeys(_describe_source(one) for one in found if one.state != "not looked up")
         ),
@@ -112,11 +115,6 @@ def _list_ranges(ends: Mapping[str, Sequence[float]]) -> list[tuple[float, float
     for kind, values in ends.items():
         kinds.setdefault((min(values), max(values)), []).append(kind.replace("sigma", "σ"))
     return [(low, high, join_names(names)) for (low, high), names in kinds.items()]
-
-
-def _describe_akin(row: CatalogueRow) -> str:
-    """Return a figure that cannot be converted, as printed, with its condition."""
-    return ", ".join(filter(None, (row.as_printed, row.condition))) if row.as_printed else ""
 
 
 def _convert_to_figure(row: CatalogueRow, value: float) -> float:

@@ -42,10 +42,8 @@ def make_methods_table(
         cells = []
         for symbol in symbols:
             rows = channel.true_components.get(symbol, [])
-            term = "GM" if len(rows) > 1 else ""
-            parts = [
-                _part(row.value, None, None, "assumed" if row.assumed else "", term) for row in rows
-            ]
+            term = "GM" * (len(rows) > 1)
+            parts = [_part(r.value, None, None, "assumed" * r.assumed, term) for r in rows]
             source = rows[0].source if rows else "Not simulated."
             cells.append(_cell(parts, source, count_digits(None, None, None, symbol)))
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})

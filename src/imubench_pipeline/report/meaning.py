@@ -133,13 +133,6 @@ class LimitLine:
     reason: str
     backtest: str
 
-    @property
-    def parenthesis(self) -> str:
-        """The interval in parentheses; empty if it does not differ from the value as printed."""
-        interval = self.interval
-        wide = isinstance(interval, SourcedInterval) and interval.ends[0] != interval.ends[1]
-        return Markup(" ({})").format(interval) if wide else ""
-
 
 @dataclass(frozen=True)
 class Group:

@@ -25,7 +25,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "code": row.verdict,
             "word": SHORT_VERDICTS[row.verdict],
             "shortfalls": list(map(shortfall_text, row.shortfalls)),
-            "conditions": [*_list_conditions(row), *_list_gaps(row)],
+            "conditions": list(_list_conditions(row)),
             "parts": list(map(share_text, row.parts)),
             "origins": origins_text(row.parts),
             "name": names.get(row.sensor, row.sensor),
@@ -46,14 +46,12 @@ def _make_context(site: Site) -> Mapping[str, object]:
     }
 
 
-def _list_gaps(row: ShortlistRow) -> Sequence[str]:
-    return row.reasons if row.verdict == "not_enough_data" else ()
-
-
 def _list_conditions(row: ShortlistRow) -> Iterator[str]:
     """Yield the conditions of a verdict; a sensor that fails does so with the best properties."""
     if row.verdict == "meets_if":
         yield from map(condition_text, row.conditions)
+    elif row.verdict == "not_enough_data":
+        yield from row.reasons
     elif row.conditions:
         yield f"not ranked: {join_names(list(map(subject_text, row.conditions)))} not known"
 

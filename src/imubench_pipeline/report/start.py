@@ -278,7 +278,6 @@ def _start(site: Site) -> Mapping[str, object]:
             for view in warned
         ],
         "in_doubt": in_doubt,
-        "in_doubt_brief": f"{numbers.counted(len(warned), 'recording')} in doubt",
         "found": [name for name, _ in found.most_common(2)],
         "changed": site.changed_devices(),
         "rankings": list(_list_rankings(site)),
@@ -331,8 +330,7 @@ def describe_simulated(views: Sequence[RecordingView]) -> str:
     if not number:
         return ""
     if number == len(views):
-        all_of_them = "All recordings are" if number > 1 else "It is"
-        return f"{all_of_them} simulated, not measured."
+        return f"{'All recordings are' if number > 1 else 'It is'} simulated, not measured."
     return f"{number} of them {'is' if number == 1 else 'are'} simulated, not measured."
 
 
@@ -384,9 +382,11 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
     """Yield the deciding limit of the best sensor, its data, and the verdicts on the others."""
     for group in ranked[:1]:
         decides = next(limit for limit in group.limits if limit.decides)
+        differ = len(set(decides.interval.split(" to "))) > 1  # as printed
+        interval = Markup(" ({})").format(decides.interval) if differ else ""
         text = Markup(
             "Deciding limit: {}. Expected error {}{}, allowed {} (the limit as 1σ)."
-        ).format(decides.limit, decides.sigma, decides.parenthesis, decides.allowed)
+        ).format(decides.limit, decides.sigma, interval, decides.allowed)
         if decides.reason:
             text += f" Not counted: {decides.reason}."
         yield text + f" {_describe_data(site, group.row)}"  # still markup

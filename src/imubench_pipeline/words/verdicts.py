@@ -477,17 +477,6 @@ def summary_text(
     )
 
 
-_HEADINGS: Mapping[Verdict, str] = {
-    "meets": "Also meet the limits",
-    "likely_meets": "Likely meet the limits",
-    "meets_if": "Meet the limits",
-    "not_enough_data": "Not enough data",
-    "likely_fails": "Likely fail",
-    "fails": "Fail",
-    "cannot_meet": "Cannot meet the limits",
-    "excluded": "Excluded",
-}
-
 _MAX_NAMES = 4  # maximum number of sensors that are named with one verdict
 
 
@@ -498,7 +487,8 @@ def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]
     for verdict in get_args(Verdict):
         for row in listed:
             if row.verdict == verdict:
-                heading = _HEADINGS[verdict] + " on conditions" * bool(row.conditions)
+                text = "also " * (verdict == "meets") + VERDICT_WORDS[verdict]
+                heading = text[:1].upper() + text[1:] + " on conditions" * bool(row.conditions)
                 why = [*map(shortfall_text, row.shortfalls)]
                 why += row.reasons if verdict == "not_enough_data" else ()
                 text = f"{names[row.sensor]} ({'; '.join(why)})" if why else names[row.sensor]
@@ -506,12 +496,12 @@ def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]
     lines = []
     for heading, own in by_heading.items():
         named = ", ".join(own) if len(own) <= _MAX_NAMES else counted(len(own), "sensor")
-        heading = _PLURAL.sub(r"\1s", heading) if len(own) == 1 else heading
+        heading = _SINGULAR.sub(r"\1", heading) if len(own) > 1 else heading
         lines.append(f"{heading}: {named}.")
     return lines
 
 
-_PLURAL = re.compile(r"(?<!Cannot )\b([Mm]eet|[Ff]ail)\b")
+_SINGULAR = re.compile(r"\b([Mm]eet|[Ff]ail)s\b")
 
 
 def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:

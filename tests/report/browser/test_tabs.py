@@ -50,7 +50,7 @@ def test_bars_of_a_budget_are_its_parts(night: Reader, bench: Report) -> None:
     figure = night.figure("budget")
     names = figure.locator(".canvas").evaluate("canvas => canvas.layout.yaxis.ticktext")
     rows = {
-        source_text(ErrorBudgetRow.from_json(row)): row["sigma"]
+        source_text(ErrorBudgetRow(**row | {"reasons": tuple(row["reasons"])})): row["sigma"]
         for row in bench.of("error_budget", recording=made.NIGHT.recording, requirement=None)
         if (row["axis"], row["error"], row["time"]) == ("worst", "heading", 60.0)
     }

@@ -36,7 +36,6 @@ CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
 
 _COORDINATE_PATTERN = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
 _DECIMALS_PATTERN = re.compile(rb"(\.\d\d)\d+")
-_LEADING_SPACE_PATTERN = re.compile(rb"\n\s+")
 
 
 def list_cross_figures(
@@ -123,5 +122,4 @@ def _write_bytes(figure: Figure, kind: str) -> bytes:
     if kind != "svg":
         return data
     # Smaller by a fifth: coordinates to a hundredth of a point.
-    data = _COORDINATE_PATTERN.sub(lambda match: _DECIMALS_PATTERN.sub(rb"\1", match[0]), data)
-    return _LEADING_SPACE_PATTERN.sub(b"\n", data)
+    return _COORDINATE_PATTERN.sub(lambda match: _DECIMALS_PATTERN.sub(rb"\1", match[0]), data)
