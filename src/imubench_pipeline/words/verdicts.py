@@ -521,11 +521,12 @@ def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str
 
 
 def _describe_action(step: comparisons.NextStepRow, *, brief: bool) -> str:
+    recording = step.recording or "a recording"
     quantities = " and ".join(SENSORS[name] for name in step.quantities)
     match step.action:
         case "check_unit":
             units = f"{quantities} unit" + "s" * (len(step.quantities) > 1)
-            return f"Check the {units.strip()} of {step.recording}"
+            return f"Check the {units.strip()} of {recording}"
         case "find_figures":
             names = join_names(list(map(subject_text, step.figures)))
             causes = {condition.figure for condition in step.figures} - {None}
@@ -534,15 +535,15 @@ def _describe_action(step: comparisons.NextStepRow, *, brief: bool) -> str:
             return f"{verb} the {names}" + f" ({'; '.join(hints)})" * bool(hints)
         case "record_again":
             doubts = "; ".join(doubt_text(doubt.code, doubt.channels) for doubt in step.doubts)
-            return f"Record {step.recording} again" + f" ({doubts})" * bool(doubts)
+            return f"Record {recording} again" + f" ({doubts})" * bool(doubts)
         case "add_channels":
             if quantities:
-                return f"Record the {quantities} too ({step.recording} has none)"
-            return f"Record all three axes ({step.recording} has fewer)"
+                return f"Record the {quantities} too ({recording} has none)"
+            return f"Record all three axes ({recording} has fewer)"
         case "log_longer":
             assert step.duration is not None  # of every such step
             more = step.duration - (step.logged or 0.0)
-            return f"Extend {step.recording} by {_round_up(more)} to {_round_up(step.duration)}"
+            return f"Extend {recording} by {_round_up(more)} to {_round_up(step.duration)}"
         case "add_specimens":
             return f"Record {counted(step.specimens or 0, 'more unit', 'more units')}"
 

@@ -78,7 +78,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             shown = (own.value, own.lower, own.upper)
             kept = (float(f"{number:.7g}") for number in shown)
             value, *ends = (unit.text(number, unit.digits(*shown)) for number in kept)
-            assert rows[symbol]["texts"][3] == f"{value} {unit.sign}{' to '.join(ends)}"
+            assert rows[symbol]["texts"][3] == f"{value} {unit.sign}({' to '.join(ends)})"
         for tau in (1.0, 10.0, 100.0):
             pair = (made.fused(log, channel) for log in (first, second))
             ratio = compare_deviations(*pair, tau, longest=1 / 9, **made.DRAWN)
@@ -181,7 +181,10 @@ def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: R
     )
     assert kept["x", "heading"]["sigma"] < kept["worst", "heading"]["sigma"]
     caption = reader.page.locator("table.errors caption")
-    for axis, words in (("x", "noise alone, axis x"), ("worst", "noise alone, the worst axis")):
+    for axis, words in (
+        ("x", "noise alone (1σ, axis x)"),
+        ("worst", "noise alone (1σ, the worst axis)"),
+    ):
         if axis == "worst":
             reader.page.locator("form.growth select").last.select_option("worst")
             assert "of=worst" in reader.page.url
