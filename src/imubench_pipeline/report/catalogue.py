@@ -110,7 +110,7 @@ def _make_cell(row: CoverageRow, found: Sequence[CatalogueRow]) -> Json:
 
 
 def _list_ranges(ends: Mapping[str, Sequence[float]]) -> list[tuple[float, float, str]]:
-    """Return each range of values with its kinds: those of the same range together."""
+    """Return each range of values with all of its kinds."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for kind, values in ends.items():
         kinds.setdefault((min(values), max(values)), []).append(kind.replace("sigma", "σ"))
