@@ -84,4 +84,4 @@ def list_remarks(rows: Sequence[ShortlistRow]) -> Iterator[str]:
         if not row.shortfalls and row.parts:
             remarks.append(origins_text(row.parts))
         if remarks:
-            yield f"{row.sensor}: {'; '.join(remarks)}"
+            yield f"{row.sensor}: {'; '.join(dict.fromkeys(remarks))}"
