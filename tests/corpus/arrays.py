@@ -74,7 +74,7 @@ NUMPY = [
         "npy with more behind it",
         file(lambda: npy(matrix()) * 2, "log.npy"),
         MATRIX,
-        Rejected(r"bytes stand behind the table"),
+        Rejected(r"bytes follow after the table"),
     ),
     Entry(
         "npy that promises too much",

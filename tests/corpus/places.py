@@ -144,7 +144,7 @@ ENTRIES = [
         "file where a folder is expected",
         file(TEXT),
         PER_FILE,
-        Rejected("log.csv: is one file, but the sensor file takes gyro_x from 'gyro.csv'"),
+        Rejected("log.csv: is a single file, but 'file:' in the sensor file expects"),
     ),
     Entry(
         "file with a name of odd letters",

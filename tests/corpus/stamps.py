@@ -79,9 +79,7 @@ ENTRIES = [
         "time in another unit than stated",
         file(lambda: log(t=1e3 * T)),
         STAMPED | {"rate": "100 Hz"},
-        Rejected(
-            "the stamps say 0.1 Hz, stated are 100 Hz: 'unit' of 'time' is probably another one"
-        ),
+        Rejected("the rate is 0.1 Hz by the stamps, but 100 Hz as stated"),
     ),
     Entry(
         "time at another rate than stated",

@@ -114,7 +114,9 @@ LAYOUTS = [
         "csv with the name of a channel twice",
         file(WHOLE.replace(",", ",1,").replace("t,1,wx,1,az", "t,wx,wx,az,x")),
         STAMPED,
-        Rejected(r"log\.csv: column 'wx' for gyro_x stands twice in the header .*by its position"),
+        Rejected(
+            r"log\.csv: column 'wx' for gyro_x occurs twice in the header .*its position instead"
+        ),
     ),
     Entry(
         "csv without a column that is named",

@@ -150,7 +150,11 @@ def test_nanoseconds_lose_no_digit_beside_a_null(tmp_path: Path, kind: str) -> N
         ({"gyro_x": {"column": "stamp"}}, {}, r"holds timestamp\[ns\]; expected numbers"),
         ({"gyro_x": {"column": "w"}}, {}, "no variable or column 'w' .* has column stamp, column"),
         ({"gyro_x": {"column": 14}}, {}, "no column 14 for gyro_x; the table has 13 columns"),
-        ({"gyro_x": {"column": "wx", "variable": "v"}}, {}, "'v' is named .* drop 'variable:'"),
+        (
+            {"gyro_x": {"column": "wx", "variable": "v"}},
+            {},
+            "of gyro_x is 'v', .* drop 'variable:'",
+        ),
         (
             {"gyro_x": {"column": "wx"}},
             {"time": {"column": "stamp", "unit": "s"}},
@@ -182,7 +186,7 @@ def test_a_name_that_stands_twice(tmp_path: Path, kind: str) -> None:
     if kind == "feather":  # its own writer refuses this
         with pa.ipc.new_file(str(path), table.schema) as file:
             file.write_table(table)
-    refused(path, log({"gyro_x": {"column": "wx"}}), "'wx' for gyro_x stands twice .* position")
+    refused(path, log({"gyro_x": {"column": "wx"}}), "'wx' for gyro_x occurs twice .* position")
     found, _, _ = contents(path, log({"gyro_x": {"column": 3}, "gyro_y": {"column": 1}}))
     assert found["gyro_x"].tolist() == [2, 2, 2]
     assert found["gyro_y"].tolist() == [1, 1, 1]
@@ -243,7 +247,7 @@ def test_rows_that_are_left_out_are_no_log(tmp_path: Path, rng: np.random.Genera
     before, stated, after = data[footer:].partition(b"\x16\xd0\x0f")
     assert stated
     path.write_bytes(data[:footer] + before + b"\x16\xd2\x0f" + after)
-    refused(path, log({"gyro_x": {"column": "wx"}}), "1000 rows are found, expected 1001")
+    refused(path, log({"gyro_x": {"column": "wx"}}), "found 1000 rows, expected 1001")
 
 
 @pytest.fixture(scope="module")

@@ -188,7 +188,7 @@ def long(bad: str, behind: int = 1) -> Callable[[], str]:
         ("// c\nwx,ax\n1,2\n5,6,7\n1,2\n", r"line 4: found 3 columns, expected 2: '5,6,7'"),
         ("wx,ax\n1,2\n5\n1,2\n", r"line 3: found 1 columns, expected 2"),
         ("wx,ax\n1,2\n\n\n1,2\nx,2\n1,2\n", r"line 6, column 'wx'"),
-        ("wx,wx,ax\n1,2,3\n", r"column 'wx' for gyro_x stands twice .* by its position"),
+        ("wx,wx,ax\n1,2,3\n", r"column 'wx' for gyro_x occurs twice .* its position instead"),
         (b"\x28\xb5\x2f\xfd" + bytes(100), r"a\.csv"),
         (long("1,oops\n"), r"line 150002, column 'ax': found 'oops'"),
         (long("1\n", 300_000), r"line 150002: found 1 columns"),
@@ -288,5 +288,7 @@ def test_files_and_folders(tmp_path: Path) -> None:
     assert [file.path.name for file in files] == ["x.csv", "y.csv"]
     with pytest.raises(RecordingError, match=r"expected one file, the folder has x.csv, y.csv"):
         read(folder, log_format())
-    with pytest.raises(RecordingError, match="is one file, but the sensor file takes gyro_x"):
+    with pytest.raises(
+        RecordingError, match="is a single file, but .file:. in the sensor file expects"
+    ):
         read(folder / "x.csv", log_format(per_axis))

@@ -175,4 +175,4 @@ def test_a_format_that_is_declared_by_half_stops_the_import(tmp_path: Path) -> N
         [sys.executable, "-c", IMPORTS, *folders], capture_output=True, text=True, check=True
     )
     for missing, said in zip(("excel", "other"), done.stdout.splitlines(), strict=True):
-        assert f"{missing}: a format of log files is declared in readers/formats.py" in said
+        assert f"{missing}: a format of log files needs a declaration" in said

@@ -149,7 +149,7 @@ def test_what_matlab_says_of_a_variable(tmp_path: Path) -> None:
         ("text", "text for gyro_x holds text; expected numbers"),
         ("none", "none for gyro_x is empty"),
         ("odd", "odd for gyro_x has a damaged class"),
-        ("complex", r"complex numbers; expected numbers: save real\(\) of it"),
+        ("complex", r"complex numbers; expected real numbers: save real\(\) of it"),
         ("sparse/data", "no variable 'sparse/data' for gyro_x; the file has m"),
         ("#refs#/a", "no variable '#refs#/a' for gyro_x; the file has m"),
     ]:
@@ -333,7 +333,7 @@ def nested(levels: int) -> bytes:
     ("part", "message"),
     [
         (variable("<", "m", (10**9, 10**6), element("<", 9, bytes(64))), "promises 1000000000 x 1"),
-        (variable("<", "m", (-1, 4), element("<", 9, bytes(64))), r"sides \(-1, 4\)"),
+        (variable("<", "m", (-1, 4), element("<", 9, bytes(64))), r"dimensions \(-1, 4\)"),
         (variable("<", "m", (8, 1), element("<", 9, bytes(64))) + bytes(16), "of type 0 at byte"),
         (variable("<", "m", (8, 1), element("<", 99, bytes(64))), "an element of type 99 at"),
         (variable("<", "m", (8, 1), b""), "an element of 8 bytes with 0 left"),
@@ -345,7 +345,7 @@ def nested(levels: int) -> bytes:
         (b"", "no numeric array for gyro_x; the file has none"),
         (
             variable("<", "m", (1, 1), element("<", 9, bytes(8))) * 2,
-            "m stands twice; expected one array of that name",
+            "m occurs twice; expected one array of that name",
         ),
     ],
 )

@@ -194,7 +194,7 @@ def test_what_is_no_numbers_is_refused(tmp_path: Path, array: np.ndarray, messag
         (
             {"gyro_x": {"column": "a"}},
             {"time": {"column": "t", "format": "iso8601", "date": 1}},
-            "'date' of 'time' is for text; expected one column",
+            "'date' of 'time' is for text logs; drop it",
         ),
     ],
 )
@@ -235,7 +235,7 @@ def test_a_named_array_of_one_without_a_name(tmp_path: Path) -> None:
         (header(shape=(-4, 4)) + bytes(128), "corrupt data, or cut short|promises -4 x 4"),
         (
             header(shape=(4,)) + bytes(64),
-            "32 bytes stand behind the table .4 values.; expected one",
+            "32 bytes follow after the table .4 values.; expected one",
         ),
         (header(shape=(4,), descr="<f8" * 5000), "a header of 15053 bytes; expected at most 10000"),
         (header(shape=(4,), descr="|O") + b"cos\nsystem\n(S'false'\ntR.", "holds objects"),

@@ -41,14 +41,16 @@ def test_anything_else_is_named(tmp_path: Path, cell: str) -> None:
     text = f"wx;ax\n1.5;2\n\n# c\n2.5;{cell}\n3.5;4\n"
     with pytest.raises(
         RecordingError,
-        match=r"a\.csv, line 5, column 'ax': found .*, expected a number with '\.' before its "
-        r"decimals, or nothing; either the file is corrupt there \(copy it again",
+        match=r"a\.csv, line 5, column 'ax': found .*, expected a number with the decimal "
+        r"sign '\.', or an empty cell; either the file is corrupt there \(copy it again",
     ):
         columns(written(tmp_path, text), log_format())
 
 
 def test_the_decimal_sign_of_the_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"found '1\.5', expected a number with ','"):
+    with pytest.raises(
+        RecordingError, match=r"found '1\.5', expected a number with the decimal sign ','"
+    ):
         columns(written(tmp_path, "wx;ax\n1,5;2\n2,5;2\n3,5;1.5\n"), log_format())
 
 

@@ -175,7 +175,7 @@ def test_counters_that_start_again(tmp_path: Path, rng: np.random.Generator) -> 
     [
         (["2021/01/01 00:00", "2021/13/01 00:00"], "%Y/%m/%d %H:%M", r"line 3.*2021/13/01"),
         (["2021/02/28 00:00", "2021/02/29 00:00"], "%Y/%m/%d %H:%M", r"line 3.*2021/02/29"),
-        (["2021/02/28 00:00", "x"], "%Y/%m/%d %H:%M", r"line 3, column 't': found 'x'.*as '%Y"),
+        (["2021/02/28 00:00", "x"], "%Y/%m/%d %H:%M", r"line 3, column 't': found 'x'.*in '%Y"),
         (["25:00", "x"], "%H:%M", r"line 2, column 't': found '25:00', expected a time stamp"),
         (["2021-01-01T00:00:00Z", "x"], "iso8601", r"line 3, column 't': found 'x'"),
         (["2021-01-01 00:00Z", "2021-01-01 00:01"], "iso8601", r"line 3, column 't'"),

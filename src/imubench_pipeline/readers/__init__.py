@@ -18,9 +18,9 @@ __all__ = ["Batch", "LogFile", "RecordingError", "find_only_log", "is_endless", 
 
 
 def log_files(path: Path) -> list[Path]:
-    """Return the file itself, or the visible files of a folder; OSError for devices and pipes.
+    """Return a log file itself, or the visible files of a folder and its subfolders, sorted.
 
-    Broken links to files are included; links to folders are not followed.
+    Includes broken links to files; follows no links to folders. OSError for a device or pipe.
     """
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
@@ -44,8 +44,8 @@ def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
     """Open a recording: a log file, or a folder or zip archive with the files of a recording.
 
     Returns a LogFile for each file, or each topic of a file, sorted by name, with its columns.
-    Raises RecordingError if a file that the format names is missing, or if the recording is a
-    folder and the format does not name the file of a channel.
+    Raises RecordingError if a file that ``log`` names is missing, or if there are several files
+    and ``log`` does not name the file of each channel.
     """
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
@@ -94,8 +94,8 @@ def _find_file(
         return path if present is None else find_only_log(path, present)
     if present is None:
         raise RecordingError(
-            f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
-            "a folder; put the files into a folder, or drop 'file:'"
+            f"{path.name}: is a single file, but 'file:' in the sensor file expects a folder with "
+            f"{source.file!r} for {name}; put the files into a folder, or drop 'file:'"
         )
     # The file may be one level deeper: a folder packed with its name, or unpacked into another.
     # Some systems store accents separately (NFD)
@@ -117,11 +117,14 @@ def _find_file(
 
 
 def find_only_log(path: Path, present: list[Path]) -> Path:
-    """Return the only log of a folder or archive, without its subfolders; else RecordingError."""
+    """Return the only log of a folder or archive; raise `RecordingError` if there is not just one.
+
+    Subfolders count only if no file lies directly in it. In an archive, only text files count.
+    """
     if not present and not path.is_dir():
         raise RecordingError(
-            f"{path.name}: the archive has no log: it is empty or cut short, or has folders, "
-            "hidden files and names outside of it (../) alone; pack the log again"
+            f"{path.name}: the archive has no log: it is empty, cut short, or has only folders, "
+            "hidden files, or paths that lead out of it (../); pack the log again"
         )
     logs = [file for file in present if file.parent == path] or present
     if 1 < len(logs) <= MAX_ARCHIVE_PROBES and not path.is_dir():

@@ -28,7 +28,7 @@ the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in 
 
 
 def name_settings_file(key: str) -> str:
-    """Return the file with the column of a channel or an additional column, for messages."""
+    """Return the name of the file that declares the column of ``key``, for messages."""
     notes = "the notes beside the log or " if key == sensor.POSITION else ""
     return f"{notes}the sensor file"
 
@@ -44,7 +44,7 @@ class Batch:
         return len(next(iter(self.columns.values())))
 
     def after(self, records: int) -> "Batch":
-        """Return the batch without its first records."""
+        """Return the batch without its first ``records`` records."""
         time = None if self.time is None else self.time[records:]
         return Batch(time, {name: values[records:] for name, values in self.columns.items()})
 
@@ -69,7 +69,7 @@ class LogFile(ABC):
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:
-        """Yield the records in order; `RecordingError` if the file is corrupt or another one."""
+        """Yield the records in order; `RecordingError` if corrupt, or not as `log` describes."""
 
     def note(self, data: FindingData, value: float, severity: Severity = "warning") -> None:
         """Add a finding about the whole file."""
@@ -102,7 +102,7 @@ class LogFile(ABC):
         return findings
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
-        """Convert stamps as written to s since the first one; exact for integers."""
+        """Convert stamps as written to s since the stamp ``first``; exact for integers."""
         assert self.log.time is not None  # requested if there are stamps
         unit, scale = self.log.time.unit or "ns", self.log.time.scale
         if unit == "samples":

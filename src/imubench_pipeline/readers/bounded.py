@@ -26,7 +26,7 @@ the meantime would keep the pipe open."""
 
 
 class BoundError(Exception):
-    """The function exceeded a limit; ``is_external``: it waited, as for a disk, or was killed."""
+    """A function exceeded a limit; ``is_external`` if it waited, as for a disk, or was killed."""
 
     def __init__(self, text: str, *, is_external: bool = False) -> None:
         super().__init__(text)
@@ -36,8 +36,7 @@ class BoundError(Exception):
 def limit_memory(more: int) -> None:
     """Limit the additional memory of this process to ``more`` bytes, on Linux.
 
-    Unlike RLIMIT_AS, the limit does not count reserved addresses, of which Arrow and numba have
-    many.
+    Unlike RLIMIT_AS, it does not count reserved addresses: Arrow and numba reserve many.
     """
     if sys.platform != "linux":
         return
@@ -53,9 +52,9 @@ def run_bounded(
 ) -> T:
     """Return the result of a function in a process of its own, with limits of time and memory.
 
-    ``seconds``: of a core; five times as long on a busy machine. ``memory``: additional bytes.
-    Raises `BoundError` if a limit is exceeded, or the system ends the process. The result is
-    pickled.
+    ``seconds``: time limit, extended up to five times while the process waits for a core or disk.
+    ``memory``: limit of additional memory, bytes. Raises `BoundError` if a limit is exceeded, or
+    the system ends the process. The result is pickled.
     """
     return Bounded(memory, function, *arguments, **named).result(seconds)
 
@@ -102,8 +101,8 @@ class Bounded(Generic[T]):
     def result(self, seconds: float) -> T:
         """Return the result of the function, or raise its exception; to be called once.
 
-        Raise `BoundError` if a limit is exceeded within ``seconds`` from now, or the system ends
-        it.
+        Raises `BoundError` if a limit is exceeded, or the system ends the process. The time limit
+        ``seconds`` counts from now.
         """
         process = psutil.Process(self._process)
         try:
@@ -126,7 +125,7 @@ class Bounded(Generic[T]):
             returned, value = pickle.loads(b"".join(received))
         except (EOFError, pickle.UnpicklingError):
             ended = os.waitstatus_to_exitcode(self._status or 0)
-            reason = f"ended the process that read it ({ended})"
+            reason = f"ended the process with exit code {ended}"
             raise BoundError(reason, is_external=ended == -signal.SIGKILL) from None
         if returned:
             result: T = value
@@ -137,7 +136,7 @@ class Bounded(Generic[T]):
 
 
 def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
-    """Return whether a process is waiting for a core or disk, within its limit of core time."""
+    """Return whether a process waits for a core or disk; not after ``seconds`` of core time."""
     try:
         waiting = process.status() in (psutil.STATUS_RUNNING, psutil.STATUS_DISK_SLEEP)
     except psutil.NoSuchProcess:

@@ -98,7 +98,7 @@ class _GzipDecompressor:
 
 
 def unpack_zstd(data: bytes, most: int) -> bytes:
-    """Return at most ``most`` bytes of a frame of zstd; raise `ValueError` if it is corrupt."""
+    """Return at most ``most`` unpacked bytes of a zstd frame; `ValueError` if it is corrupt."""
     try:
         return _create_zstd().decompress(data, most)
     except zstd.ZstdError as error:
@@ -149,7 +149,10 @@ _UNKNOWN_SIZE = 1 << 62
 
 
 class Bytes:
-    """The decompressed bytes of a log; ``name``: name of the log, for messages."""
+    """The decompressed bytes of a log.
+
+    ``name``: of the log, for messages. ``size``: compressed bytes. ``under``: files to close, too.
+    """
 
     def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
         self.name = name
@@ -159,7 +162,7 @@ class Bytes:
         self._left = max(bounds.MIN_CHECKED_EXPANSION, bounds.MAX_EXPANSION_RATIO * size)
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, at most ``size``, or RecordingError; none at the end."""
+        """Return the next bytes, at most ``size``; empty at the end. RecordingError if corrupt."""
         try:
             # Not `read`, which discards the data before an early end.
             block: bytes = self._stream.read1(size)
@@ -172,7 +175,7 @@ class Bytes:
         if self._left < 0:
             raise RecordingError(
                 f"{self.name}: expands to more than {bounds.MAX_EXPANSION_RATIO} times its size, "
-                "which no log does; expected compressed text: unpack it and look what it is"
+                "which no log does; expected compressed text: unpack it and check its content"
             )
         return block
 
@@ -300,7 +303,7 @@ def list_members(archive: Path) -> list[Path]:
 
 
 def is_visible(path: Path) -> bool:
-    """Return whether a path within a folder is not a hidden file of the operating system."""
+    """Return whether no part of a path within a folder is hidden (``.name``, ``__MACOSX``)."""
     return not any(part.startswith((".", "__MACOSX")) for part in path.parts)
 
 
@@ -346,8 +349,8 @@ def _read_directory(archive: Path, _size: int, _written: int) -> Mapping[str, zi
         other = by_name.setdefault(name, info)
         if other is not info and is_visible(Path(name)):
             raise RecordingError(
-                f"{archive.name}: {_describe_member(other)} and {_describe_member(info)} have one "
-                "name; expected each name once: pack it again with unique names"
+                f"{archive.name}: {_describe_member(other)} and {_describe_member(info)} have the "
+                "same name; expected each name once: pack it again with unique names"
             )
     return by_name
 
@@ -376,8 +379,8 @@ class _Archive(io.FileIO):
     def read(self, size: int | None = -1) -> bytes:
         if self.most is not None and size is not None and size > self.most:
             raise RecordingError(
-                f"{self._shown}: the directory of the archive has {size} bytes, which are some "
-                f"{size // 60} members; expected at most {self.most} bytes: pack the log alone"
+                f"{self._shown}: the directory of the archive has {size} bytes, for about "
+                f"{size // 60} files; expected at most {self.most} bytes: pack only the log"
             )
         return super().read(-1 if size is None else size)
 
@@ -398,8 +401,8 @@ def _scan_for_members(archive: Path) -> list[zipfile.ZipInfo]:
                 at = data.find(_ZIP_LOCAL, at + 1)
             if len(members) > bounds.MAX_MEMBERS and not ended:
                 raise RecordingError(
-                    f"{archive.name}: an archive without its directory, with more than "
-                    f"{bounds.MAX_MEMBERS} members; expected the log alone: pack it anew"
+                    f"{archive.name}: the archive is cut short and has more than "
+                    f"{bounds.MAX_MEMBERS} files; expected a complete archive: pack only the log"
                 )
             data = data[at if at >= 0 else max(len(data) - 3, 0) :]
     return members
@@ -438,7 +441,7 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _list_directory(archive).get(name)
     if info is None:
-        raise RecordingError(f"{shown}: no such file in the archive; it may be cut short")
+        raise RecordingError(f"{shown}: no such file in the archive, or cut short: pack it again")
     if info.flag_bits & _FLAG_ENCRYPTED:
         raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
     if stat.S_ISLNK(info.external_attr >> 16):
@@ -446,8 +449,8 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     if info.compress_type not in _ZIP_METHODS:
         method = _OTHER_METHODS.get(info.compress_type, "unknown")
         raise RecordingError(
-            f"{shown}: is packed by method {info.compress_type} ({method}); expected deflate, or "
-            "none: unpack the archive"
+            f"{shown}: is packed by method {info.compress_type} ({method}); expected deflate or "
+            "no compression: unpack the archive"
         )
     try:
         file.seek(info.header_offset)
@@ -470,7 +473,8 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings`` gets those about truncated data, and about runs of ``least_zeros`` zero bytes.
+    Findings about truncated data, and about runs of ``least_zeros`` or more zero bytes, are added
+    to ``findings``.
     Raises `RecordingError` if the file cannot be opened, or compressed data are corrupt.
     """
     zeros = ZeroRuns(least_zeros)

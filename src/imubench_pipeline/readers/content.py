@@ -29,7 +29,7 @@ def is_endless(path: Path) -> bool:
 
 
 def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
-    """Return the stated format of a file (``reader``), or else the one of its content."""
+    """Return the format that a sensor file states (``reader``); if None, by content."""
     if stated is None:
         return recognise_content(path)[0]
     _refuse_missing_extension(path, stated)
@@ -39,8 +39,9 @@ def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
 def recognise_content(path: Path) -> tuple[FileFormat, str]:
     """Return the format of a log, and its compression; empty if it is not compressed.
 
-    ``path``: a file, the folder of a ROS 2 bag, or a member of an archive; an archive of several
-    files is text. Raises `RecordingError` if it cannot be opened, or may not be compressed so.
+    ``path``: a file, the folder of a ROS 2 bag, or a member of an archive. A zip archive is text,
+    except for formats that are zip files, as .npz. Raises `RecordingError` if the file cannot be
+    opened, has an unsupported format, or must not be compressed.
     """
     if (of_folder := recognise_folder(path)) is not None:
         return of_folder, ""
@@ -75,8 +76,8 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
     file_format = next(chain(begun, matching), TEXT)
     if packed and not file_format.streamed:
         raise RecordingError(
-            f"{path.name}: holds a file of the reader {file_format.name!r}, compressed by "
-            f"{packed}; expected it uncompressed: unpack it"
+            f"{path.name}: is compressed by {packed}, but the reader {file_format.name!r} expects "
+            "an uncompressed file: unpack it"
         )
     return file_format, packed
 
@@ -100,5 +101,5 @@ def _refuse_missing_extension(path: Path, reader: Reader) -> None:
     if reader not in FILE_FORMATS:
         raise RecordingError(
             f"{path.name}: needs the reader {reader!r} of the extension 'formats', which is not "
-            "installed; expected its folder extensions/formats: install it, or log as text"
+            "installed; restore the folder extensions/formats, or record the log as text"
         )

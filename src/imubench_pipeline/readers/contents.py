@@ -18,18 +18,18 @@ MAX_FILES = 200  # largest number of files of a folder that are examined
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of a recording."""
+    """Tables and columns of a recording, as the beginning of its files shows them."""
 
     path: Path
     about: str  # kind of the recording, such as its format
     tables: tuple[LogTable, ...]
-    stated: FileFormat | None = None  # format to state, since the first bytes do not show it
+    stated: FileFormat | None = None  # to be stated as `reader`: the first bytes do not show it
     files: int = 1  # number of files; at most `MAX_FILES` are examined
     only: str | None = None  # the only file of a folder that is read if no `file` is stated
 
 
 def list_contents(path: Path) -> Contents:
-    """Return the contents of a recording from its beginning; RecordingError without data."""
+    """Return the contents of a recording; raise `RecordingError` without a column of numbers."""
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")
     if path.is_dir() and recognise_folder(path) is None:
@@ -86,7 +86,7 @@ def _check_has_numbers(path: Path, tables: Sequence[LogTable]) -> None:
         for table in tables
         if table.fault
     ]
-    why = "; ".join(faults[:_MAX_SHOWN_FAULTS]) or "text alone"
+    why = "; ".join(faults[:_MAX_SHOWN_FAULTS]) or "only text"
     raise RecordingError(
-        f"{path.name}: holds no column of figures ({why}); expected the log of an inertial sensor"
+        f"{path.name}: has no column of numbers ({why}); expected the log of an inertial sensor"
     )

@@ -60,7 +60,7 @@ class FileFormat:
     time_columns: tuple[str, ...] = ()  # names that the format fixes
     settings: tuple[str, ...] = ()  # entries of `log` that apply to this format, but not to all
     vendor: str | None = None  # vendor of all sensors with such logs
-    measured_by_name: bool = False  # linear acceleration includes gravity
+    measured_by_name: bool = False  # ``linear_acceleration`` includes gravity in this format
     extra: Extra | None = None  # extra of the package with a library for the code
 
     def load(self) -> Code:
@@ -101,7 +101,7 @@ class LogColumn:
     def of_numbers(
         cls, source: str, label: str, values: NDArray[Any], unit: str | None = None
     ) -> "LogColumn":
-        """Return a column of numbers."""
+        """Return the description of a column of numbers, with its first values as text."""
         first = format_first_numbers(values)
         return cls(source, label, "number", first, values.astype(np.float64), unit)
 
@@ -124,12 +124,12 @@ class LogTable:
 
 
 def format_first_numbers(values: NDArray[Any]) -> tuple[str, ...]:
-    """Return the first numbers as text."""
+    """Return the first `MAX_SHOWN_VALUES` numbers as text."""
     whole = values.dtype.kind in "iu"
     return tuple(str(value) if whole else f"{value:.10g}" for value in values[:MAX_SHOWN_VALUES])
 
 
 def join_first(names: Iterable[str], most: int = 20) -> str:
-    """Return the first names as text, each cut."""
+    """Join the first ``most`` names by commas; long names are cut, and further ones are "..."."""
     every = list(names)
     return ", ".join([*(cut(name, str) for name in every[:most]), *["..."] * (len(every) > most)])

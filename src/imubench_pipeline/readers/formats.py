@@ -112,8 +112,9 @@ _ADDED: Hook[FileFormat] = Hook("formats")
 _formats = {found.name: found for found in (*_DECLARED, *_ADDED.objects())}
 if _missing := (_formats.keys() ^ get_args(Reader)) - (EXTENSION_MARKS.keys() - _formats.keys()):
     raise ImportError(
-        f"{', '.join(sorted(_missing))}: a format of log files is declared in readers/formats.py, "
-        "or by an extension, and has its name in settings.sensor.Reader; one of them is missing"
+        f"{', '.join(sorted(_missing))}: a format of log files needs a declaration (in "
+        "readers/formats.py or an extension) and its name in settings.sensor.Reader; add the "
+        "missing one"
     )
 
 FILE_FORMATS: Mapping[Reader, FileFormat] = {

@@ -126,9 +126,9 @@ class ZeroRuns:
     ) -> Finding | None:
         """Return the finding about the zero bytes of the file ``name``; None if there are none.
 
-        ``where``: place of the first run. ``total``: with those in holes (`FileWithoutHoles`).
-        ``damaged``: lines with zeros between letters. ``shifted``: later samples are shifted in
-        time.
+        ``where``: place of the first run. ``total``: number of zero bytes, including holes
+        (`FileWithoutHoles`). ``damaged``: number of lines with zeros between letters. ``shifted``:
+        whether later samples are shifted in time.
         """
         if not self.count:
             return None

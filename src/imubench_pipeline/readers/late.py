@@ -11,8 +11,8 @@ from imubench_pipeline.words.findings.files import LateRecords
 MAX_LATE_RECORDS = 1000  # records by which one may be late
 _MIN_STEP, _MAX_STEP = 0.5, 3.5  # of sorted stamps around a late one, over the median step
 _MAX_LATE_SHARE, _MIN_REGULAR = 0.2, 0.8
-"""Largest share of late records, and least share of regular steps of the sorted stamps: others
-scatter or run backwards, and say nothing of the order."""
+"""Largest share of late records, and least share of regular steps of the sorted stamps: other
+stamps scatter or run backwards, and do not show the order."""
 
 
 def sort_late_records(file: LogFile) -> Iterator[Batch]:

@@ -7,7 +7,7 @@ from imubench_pipeline.settings.sensor import Reader
 
 
 class OtherFormat(NamedTuple):
-    """A format that no reader takes."""
+    """A known format that cannot be read, and how to convert it."""
 
     name: str  # with its article
     marks: tuple[bytes, ...]  # one of them is at ``place``
@@ -62,5 +62,5 @@ EXTENSION_MARKS: Mapping[Reader, tuple[bytes, ...]] = {
 
 
 def find_other_format(begin: bytes) -> OtherFormat | None:
-    """Return the known format with the first bytes of a file, or None."""
+    """Return the unsupported format that the first bytes of a file show, or None."""
     return next((each for each in OTHER_FORMATS if begin.startswith(each.marks, each.place)), None)

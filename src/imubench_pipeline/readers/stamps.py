@@ -17,9 +17,9 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 
 
 class Clock:
-    """Converts the stamps of a file to s since the first one, and sets its ``started``.
+    """Converts the stamps of a file to s since the first one, and sets ``started`` of the file.
 
-    ``wraps``: value at which stamps wrap to 0, or None. ``started``: returns the date of the first.
+    ``wraps``: value at which stamps wrap to 0, or None. ``started``: from first stamp to its date.
     """
 
     def __init__(
@@ -32,7 +32,10 @@ class Clock:
         self.first: Any = None
 
     def seconds(self, stamps: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return s since the first stamp, shape (n,); NaN without one, `RecordingError` if all."""
+        """Return s since the first stamp, shape (n,); NaN where a stamp is not ``present``.
+
+        Raises `RecordingError` if the first block has no stamp.
+        """
         if self._wraps is not None:
             stamps = stamps.copy()
             stamps[present] = unwrap(stamps[present], self._wraps, self._state)
@@ -57,10 +60,11 @@ class WrapState:
 
 
 def unwrap(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
-    """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
+    """Return the stamps of a counter without wraps; int64 if integers, else float64 with NaN.
 
-    A step back by more than half of ``wraps`` is a wrap; such a step forward is a late record or a
-    damaged stamp, which does not affect the others. ``state``: between blocks; changed in place.
+    ``wraps``: value at which the counter returns to 0. A step back by more than half of it is a
+    wrap. A step forward by more than half of it undoes a wrap, so that a late record or a damaged
+    stamp does not affect later ones. ``state``: after the last block; updated in place.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)
@@ -85,7 +89,7 @@ def format_date(nanoseconds: int) -> str | None:
 
 
 def format_date_of_stamp(first: float, source: TimeSource) -> str | None:
-    """Return ISO 8601 date and time of a stamp as written (see `format_date`); ns are exact."""
+    """Return ISO 8601 date and time of a stamp as written; None as in `format_date`."""
     if source.unit not in SECONDS:
         return None
     if source.unit == "ns" and source.scale == 1:
@@ -95,5 +99,5 @@ def format_date_of_stamp(first: float, source: TimeSource) -> str | None:
 
 
 def format_nanoseconds(since_1970: Any) -> str:
-    """Return ISO 8601 date and time of ns since 1970 that are known to be a date."""
+    """Return ISO 8601 date and time of ns since 1970, in any year, to the millisecond."""
     return str(np.datetime64(int(since_1970), "ns"))[:23]

@@ -41,7 +41,7 @@ _SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def parse_unit(text: str, dimension: str) -> str | None:
-    """Return the unit of a text, such as ``m_s2``, as in a sensor file; None if it is unknown."""
+    """Return the unit that a text such as ``m_s2`` names, as in a sensor file; None if unknown."""
     text = text.strip()
     if not text or len(text) > _MAX_UNIT_LENGTH:
         return None
@@ -65,7 +65,7 @@ def parse_unit(text: str, dimension: str) -> str | None:
 def split_unit(label: str, dimension: str) -> tuple[str, str | None]:
     """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
-    The name is without texts in brackets, except numbers. ``dimension``: dimension of the unit.
+    Texts in brackets, except numbers, are removed from the name. ``dimension``: of the unit.
     """
     unit = next(
         (unit for text in find_bracketed(label) if (unit := parse_unit(text, dimension))), None
@@ -94,14 +94,17 @@ _MAX_SHOWN_NAME = 60
 
 @dataclass(frozen=True)
 class StatedUnit:
-    """The unit of a channel that the log states."""
+    """The unit that a log states for a channel."""
 
     unit: str  # unit in the notation of a sensor file
     where: str  # the place in the log
 
 
 def find_stated_unit(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
-    """Return the unit that a log states for a channel in ``text`` or ``label``; None if unknown."""
+    """Return the unit that a log states for a channel in ``text`` or ``label``; None if unknown.
+
+    ``where``: place of ``text`` in the log, in words.
+    """
     if channel not in CHANNELS:
         return None
     dimension = QUANTITIES[quantity_of(channel)]

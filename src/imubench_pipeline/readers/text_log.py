@@ -20,12 +20,12 @@ _DECIMALS = 12  # more are rounding errors, and would double the size of the fil
 
 
 class TextLog(AbstractContextManager["TextLog"]):
-    """A text file in the layout of the logs of a sensor; the rate is in Hz.
+    """Writes a text file in the layout of the logs of a sensor; ``rate`` is in Hz.
 
-    ``sources`` are of the channels, and of ``temperature``, of this file. ``remarks`` are comments
-    at its top, below the mark of a simulated log, if the layout has comments. ``kind`` is the type
-    of the numbers: float32 has seven digits, far finer than the noise, and halves the text. Raise
-    `ConfigError` if its stamps are not simple numbers.
+    ``sources`` are the columns of the channels and of ``temperature`` in this file. ``remarks`` are
+    comments at the top, below the mark of a simulated log, if the layout has comments. ``kind`` is
+    the type of the numbers: float32 has seven digits, far finer than the noise, and halves the
+    text. Raises `ConfigError` if the layout has stamps that are not simple numbers.
     """
 
     def __init__(
@@ -44,7 +44,8 @@ class TextLog(AbstractContextManager["TextLog"]):
         if (time := log.time) is not None:
             if time.unit is None or time.unit == "samples" or time.wraps is not None:
                 raise ConfigError(
-                    "simulated logs have numeric time stamps in s, ms, us or ns that never wrap"
+                    "a simulated log needs numeric time stamps in s, ms, us or ns that never wrap; "
+                    "mend 'unit' of 'time' in the sensor file, and drop 'format' and 'wraps'"
                 )
             self._stamp_unit = SECONDS[time.unit] * time.scale
             placed[time.column] = "time"

@@ -99,7 +99,7 @@ ARRAYS = {
     ),
     "15000 sides": Attack(
         file("a.mat", lambda: matlab(matrix(DOUBLE, b"a", sides=(9,) * 15_000))),
-        r"corrupt data: sides \(9, 9",
+        r"corrupt data: dimensions \(9, 9",
         channels=FIRST,
     ),
     "11000 cells": Attack(

@@ -54,7 +54,7 @@ FLIGHT = {
         file("a.ulg", nested), "found none", NO_MESSAGE, channels=GYRO
     ),
     "1100 topics of 1000 fields": Attack(
-        file("a.ulg", wide), "several|expected one kind", "no column of figures", channels=GYRO
+        file("a.ulg", wide), "several|expected one kind", "no column of numbers", channels=GYRO
     ),
     "marks of a ULog alone": Attack(
         file("a.ulg", lambda: ulog_header() + message("S", b"") * 3_000_000),

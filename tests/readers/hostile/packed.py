@@ -106,10 +106,10 @@ PACKED = {
     "a directory just small enough": Attack(
         file("log.zip", lambda: directory_of((1 << 21) // 54)),
         "expected one file, the archive has",
-        "holds no column of figures",
+        "has no column of numbers",
     ),
     "100000 members and no directory": Attack(
-        file("log.zip", lambda: local_headers(100_000)), "without its directory, with more than"
+        file("log.zip", lambda: local_headers(100_000)), "cut short and has more than"
     ),
     "a member that is longer than is said": Attack(
         lying_archive, "more data than stated in the directory"

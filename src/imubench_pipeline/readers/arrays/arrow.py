@@ -28,7 +28,7 @@ class ArrowFile(ArrayFile):
     """A Parquet, Feather or Arrow IPC file."""
 
     def tables(self, stack: ExitStack) -> Iterable[Table]:
-        """Read the schema."""
+        """Return the columns of the file as one table (see `ArrayFile.tables`)."""
         with self.path.open("rb") as file:
             begin = file.read(len(_ARROW_FILE_MAGIC))
         if begin.startswith(_PARQUET_MAGIC):
@@ -117,7 +117,7 @@ class _ParquetTable(_ArrowTable):
             yield batch
         if read != self.rows:  # rows of a damaged page can be left out without an error
             raise UnusableError(
-                f"is damaged: {read} rows are found, expected {self.rows}; copy the file again"
+                f"is damaged: found {read} rows, expected {self.rows}; copy the file again"
             )
 
 

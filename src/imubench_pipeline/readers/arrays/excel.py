@@ -21,7 +21,7 @@ from imubench_pipeline.readers.bounds import MAX_SEARCHED_COLUMNS, MAX_SHEET_MEM
 
 _MAX_WAIT = 60.0  # s; a sheet of a million rows takes some seconds
 _MAX_ROWS_BEFORE = 100  # searched for the first row of numbers
-_EXPORT = "expected .xlsx or .xls with a sheet of numbers, no password: export it as CSV"
+_EXPORT = "expected .xlsx or .xls with a sheet of numbers, without password: export it as CSV"
 
 
 class Sheet(table.Table):
@@ -55,7 +55,7 @@ class ExcelFile(ArrayFile):
     """A workbook of Excel."""
 
     def tables(self, stack: ExitStack) -> Iterable[table.Table]:
-        """Read the sheets that are named, or all."""
+        """Return the sheets that the sensor file names, or all if it names none."""
         stated = frozenset(s.variable for s in self.sources.values() if s.variable is not None)
         try:
             return run_bounded(_MAX_WAIT, MAX_SHEET_MEMORY, _read_sheets, self.path, stated)

@@ -68,7 +68,7 @@ class ArrayFile(LogFile):
 
     @abstractmethod
     def tables(self, stack: ExitStack) -> Iterable[Table]:
-        """Open the file, to be closed by the stack, and return its tables."""
+        """Open the file, which ``stack`` closes, and return its tables."""
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
@@ -127,8 +127,8 @@ class ArrayFile(LogFile):
             read += count
             if 8 * read * len(places) > most:
                 raise UnusableError(
-                    f"its {size} bytes hold more than {read - count} records; expected figures "
-                    f"that take at most {MAX_EXPANSION_RATIO} times the size of their file"
+                    f"its {size} bytes expand to more than {read - count} records; expected at "
+                    f"most {MAX_EXPANSION_RATIO} times the size of the file: check its content"
                 )
             if count:
                 yield block
@@ -141,10 +141,10 @@ class ArrayFile(LogFile):
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
         if len(tables) > MAX_ARRAYS:
-            raise UnusableError(f"more than {MAX_ARRAYS} arrays; expected the log of one sensor")
+            raise UnusableError(f"more than {MAX_ARRAYS} arrays; save those of one sensor alone")
         for table in tables:
             if table.name in by_name:
-                raise UnusableError(f"{table.shown} stands twice; expected one array of that name")
+                raise UnusableError(f"{table.shown} occurs twice; expected one array of that name")
             by_name[table.name] = table
         places = {}
         for key, source in self.sources.items():
@@ -158,11 +158,11 @@ class ArrayFile(LogFile):
         if (time := self.log.time) is not None:
             if time.date is not None:
                 raise UnusableError(
-                    "'date' of 'time' is for text; expected one column of dates or numbers"
+                    "'date' of 'time' is for text logs; drop it: expected one column of time"
                 )
             if time.format not in (None, "iso8601"):
                 raise UnusableError(
-                    f"found format {time.format!r} of 'time', which is for text; expected "
+                    f"found format {time.format!r} of 'time', which is for text logs; expected "
                     "'format: iso8601' for a column of dates, or 'unit' for numbers"
                 )
             variables = {source.variable for source in self.sources.values()}
@@ -187,7 +187,7 @@ class ArrayFile(LogFile):
 
 
 def count_block_rows(row_bytes: int, most: int) -> int:
-    """Return the records of a block of ``most`` bytes; `UnusableError` if one is larger."""
+    """Return how many records fit into ``most`` bytes; `UnusableError` if one record is larger."""
     if row_bytes > most:
         raise UnusableError(
             f"one record takes {row_bytes} bytes; expected at most {most}: store the columns of "
@@ -243,11 +243,11 @@ def _find_column(
         names = join_first(table.shown for table, _ in matches)
         if len({table for table, _ in matches}) == 1:
             raise UnusableError(
-                f"column {column!r} for {key} stands twice in {names}; take it by its position, "
+                f"column {column!r} for {key} occurs twice in {names}; give its position instead, "
                 "as a number"
             )
         raise UnusableError(
-            f"column {column!r} for {key} is in several variables ({names}); name the one with "
+            f"column {column!r} for {key} is in several variables ({names}); name one of them with "
             f"'variable:', or as in 'column: {matches[0][0].name}/{column}'"
         )
     address = _make_address(column, variable)
@@ -298,7 +298,7 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
             return _check_usable(tables[name], key)
         if list(tables) == [""]:
             raise UnusableError(
-                f"{variable!r} is named for {key}, but the file holds one array without a name; "
+                f"'variable' of {key} is {variable!r}, but the file has one array without a name; "
                 "drop 'variable:'"
             )
         raise UnusableError(

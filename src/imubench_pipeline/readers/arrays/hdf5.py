@@ -31,7 +31,7 @@ class Hdf5File(ArrayFile):
     """An HDF5 file."""
 
     def tables(self, stack: ExitStack) -> Iterable[Table]:
-        """Describe every data set."""
+        """Return a table for each data set (see `ArrayFile.tables`)."""
         if not h5py.is_hdf5(self.path):
             raise UnusableError(
                 "not an HDF5 file, or its beginning is damaged; mend 'reader' in the sensor file, "
@@ -43,8 +43,8 @@ class Hdf5File(ArrayFile):
 def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> "list[DataSet]":
     """Return the data sets of a file by name; only hard links are followed.
 
-    ``passed_over``: prefix of root names that are not data. Raises `UnusableError` beyond the
-    bounds.
+    ``time_axis``: see `Array`. ``passed_over``: prefix of names at the root that are not data.
+    Raises `UnusableError` if there are too many objects, or groups nested too deeply.
     """
     objects = 0
     seen = {_get_identity(file)}
@@ -60,7 +60,7 @@ def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0")
         if objects + len(group) > bounds.MAX_OBJECTS:
             raise UnusableError(
                 f"more than {bounds.MAX_OBJECTS} objects; expected the log of one sensor: copy its "
-                "data sets into a file of their own"
+                "data sets into a separate file"
             )
         for key in sorted(group, key=lambda key: key.encode() if isinstance(key, str) else key):
             objects += 1
@@ -136,7 +136,7 @@ class DataSet(Array):
         return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the additional memory for reading these columns, bytes."""
+        """Return the memory for reading these columns that a block does not include, bytes."""
         return self._chunk
 
     def row_bytes(self, positions: Sequence[int]) -> int:

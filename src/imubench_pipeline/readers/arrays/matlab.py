@@ -31,14 +31,14 @@ _OBJECT_FAULT = (
     "is a table, a timetable or another object, which only MATLAB reads; expected a vector or a "
     "matrix: save its columns, as in t = seconds(x.Time); v = x.Variables; save('log.mat','t','v')"
 )
-_COMPLEX_FAULT = "holds complex numbers; expected numbers: save real() of it"
+_COMPLEX_FAULT = "holds complex numbers; expected real numbers: save real() of it"
 
 
 class MatlabFile(ArrayFile):
     """A MATLAB file of version 7.3 or 5."""
 
     def tables(self, stack: ExitStack) -> Iterable[table.Table]:
-        """Describe every variable."""
+        """Return a table for each variable (see `ArrayFile.tables`)."""
         if h5py.is_hdf5(self.path):
             return _list_variables_of_7(stack.enter_context(h5py.File(self.path, "r")))
         with self.path.open("rb") as file:
@@ -210,7 +210,7 @@ def _read_matrix(
         sides = b"" if kind == _CLASS_TABLE else elements.data(5)
         shape = struct.unpack(f"{elements.order}{len(sides) // 4}i", sides)
         if kind != _CLASS_TABLE and (not 2 <= len(shape) <= MAX_DIMENSIONS or min(shape) < 0):
-            raise _make_damaged_error(f"sides {shape[:MAX_DIMENSIONS]}", elements.at)
+            raise _make_damaged_error(f"dimensions {shape[:MAX_DIMENSIONS]}", elements.at)
         own = elements.data(1, 16).decode("utf-8", "replace")
         if len(own) > MAX_MATLAB_NAME:
             raise _make_damaged_error(f"a name of {len(own)} letters", elements.at)

@@ -29,7 +29,7 @@ class NumpyFile(ArrayFile):
     """An NPY or NPZ file."""
 
     def tables(self, stack: ExitStack) -> Iterable[table.Table]:
-        """Read the headers of the arrays."""
+        """Return the arrays from their headers (see `ArrayFile.tables`)."""
         with self.path.open("rb") as file:
             begin = file.read(len(npy.MAGIC_PREFIX))
         if begin == npy.MAGIC_PREFIX:
@@ -97,7 +97,7 @@ def _read_array_header(
         )
     if promised < size and not dtype.hasobject:
         raise table.UnusableError(
-            f"{size - promised} bytes stand behind {shown} ({table.describe_shape(shape)} values); "
+            f"{size - promised} bytes follow after {shown} ({table.describe_shape(shape)} values); "
             "expected one array: save several with numpy.savez"
         )
     return array

@@ -66,7 +66,7 @@ class Table:
         return 0
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the additional memory for reading these columns, bytes."""
+        """Return the memory for reading these columns that a block does not include, bytes."""
         return 0
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
@@ -114,7 +114,7 @@ class Array(Table):
             if shape:
                 self.fault = (
                     f"has {len(shape)} dimensions ({describe_shape(shape)}); expected a vector, or "
-                    "a matrix with a column a channel: reshape it"
+                    "a matrix with one column per channel: reshape it"
                 )
             return
         if 0 in shape:
@@ -144,7 +144,7 @@ class Array(Table):
         return Column(label, dtype.kind, _KIND_NAMES.get(dtype.kind, str(dtype)))
 
     def fields(self, positions: Sequence[int]) -> list[str]:
-        """Return the fields of a record with these columns; empty if it has no fields."""
+        """Return the names of the fields that contain these columns; empty without fields."""
         if not self._leaves:
             return []
         return list(dict.fromkeys(str(self._leaves[position].path[0]) for position in positions))
@@ -190,9 +190,9 @@ _SKIP_BLOCK = 1 << 20
 class StreamedArray(Array):
     """An array (see `Array`) with consecutive elements in a file or in a compressed part of it.
 
-    ``fortran``: the first index varies fastest; each column then has a stream of its own.
-    ``opened``: opens a stream, which its caller closes. ``offset``: bytes before the first element.
-    ``checked``: a checksum is verified at their end.
+    ``fortran``: the first index varies fastest. ``opened``: function that opens a stream, to be
+    closed by the caller. ``offset``: bytes before the first element. ``checked``: whether reading a
+    stream to its end verifies a checksum.
     """
 
     def __init__(

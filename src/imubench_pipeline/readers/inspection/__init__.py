@@ -50,8 +50,8 @@ def inspect(path: Path, model: str | None = None, topics: Sequence[str] = ()) ->
     """Inspect a recording (file, folder, zip archive or ROS 2 bag) and draft a sensor file for it.
 
     Only the beginning of each file is read. ``model``: name of the sensor; None: the name of the
-    log. ``topics``: of a bag, the ones to use; none: all. Raises `RecordingError` if it cannot be
-    read, has no such topic, or is no log.
+    log. ``topics``: topics of a bag to use; empty: all. Raises `RecordingError` if the recording
+    cannot be read, lacks one of the topics, or has no column of numbers.
     """
     # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):
@@ -72,7 +72,7 @@ def _select_topics(log: Contents, topics: Sequence[str]) -> Contents:
     present = {table.name.strip("/"): table for table in log.tables}
     if missing := sorted(wanted - set(present)):
         names = ", ".join(table.name for table in log.tables if table.name) or "none"
-        raise RecordingError(f"{log.path.name}: no topic {missing[0]}; there are: {names}")
+        raise RecordingError(f"{log.path.name}: no topic {missing[0]}; name one of {names}")
     return replace(log, tables=tuple(present[name] for name in present if name in wanted))
 
 
@@ -155,7 +155,7 @@ class _FirstRecords:
 
 
 def check_draft(path: Path, draft: Draft) -> Proof:
-    """Read the first records with a draft, and arbitrary units and rates for missing ones."""
+    """Return the result of reading the first records; missing units and rates are arbitrary."""
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):
         return Proof(False, f"not read: fill in {_list_keys(unfilled)}")
@@ -212,7 +212,7 @@ def _read_first_records(file: LogFile) -> _FirstRecords:
         if rows >= _MIN_RECORDS or number >= _MAX_BATCHES:
             break
     if not rows:
-        raise RecordingError(f"{file.path.name}: no record in its beginning")
+        raise RecordingError(f"{file.path.name}: no record at its beginning; expected some")
     interval = estimate_step(np.concatenate(times)) if times else None
     return _FirstRecords(
         {name: np.concatenate(values) for name, values in parts.items()},

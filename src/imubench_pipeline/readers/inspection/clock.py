@@ -49,7 +49,7 @@ _UNIT_HINT = "not stated in the file: s, ms, us or ns?"
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """The time of a table, as a sensor file states it."""
+    """A column that may be the time of a table, with its entry in a sensor file."""
 
     column: LogColumn
     entry: Entry[Source]  # `time` of the sensor file
@@ -183,9 +183,9 @@ def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def estimate_step(values: NDArray[np.float64]) -> float | None:
-    """Return the step from sample to sample; None if the stamps do not advance.
+    """Return the step from sample to sample, in the unit of the stamps; None if none advances.
 
-    If most are equal, steps over missing samples are left out; if they scatter, it is the mean.
+    If most steps are equal, steps over missing samples are ignored; else, all steps are averaged.
     """
     steps = _take_steps(values)
     forward = steps[steps > 0]
@@ -216,7 +216,7 @@ def _guess_wrap(values: NDArray[np.float64]) -> int | None:
 
 
 def is_advancing(values: NDArray[np.float64], wrap: float | None = None) -> bool:
-    """Return whether stamps increase, except for a few wraps or restarts."""
+    """Return whether stamps increase, except for wraps to 0 at ``wrap``, and a few steps back."""
     steps = _take_steps(values)
     if wrap is not None:
         steps = np.where(steps < -wrap / 2, steps + wrap, steps)

@@ -35,7 +35,7 @@ class Source:
     wraps: int | None = None
 
     def to_json(self) -> dict[str, JsonValue]:
-        """Return the keys that have a value."""
+        """Return the keys that have a value, with their values."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 
@@ -54,7 +54,7 @@ class Draft:
 
     @property
     def known(self) -> list[tuple[str, Entry[str | Source]]]:
-        """The entries under ``log``, except for columns, that the log determines."""
+        """The entries under ``log`` that have a value, without channels and temperature."""
         entries = ("reader", self.reader), ("rate", self.rate), ("time", self.time)
         return [(key, entry) for key, entry in entries if entry is not None]
 
@@ -71,7 +71,7 @@ class Draft:
         return {"vendor": self.vendor.value, "model": self.model.value, "log": self.log()}
 
     def with_units(self, unit_of: Callable[[str, str | None], str | None]) -> "Draft":
-        """Return a draft with the units of ``unit_of(key, unit)``; None leaves a unit."""
+        """Return a draft with each unit replaced by ``unit_of(key, unit)``, unless it is None."""
 
         def change(key: str, entry: Entry[Source]) -> Entry[Source]:
             unit = unit_of(key, entry.value.unit)

@@ -76,7 +76,7 @@ class Group:
 
     @property
     def gravity_unit(self) -> str | None:
-        """Unit in which the mean has the length of gravity; the stated one, if there is one."""
+        """Unit (the stated one, if any) in which the mean vector is as long as gravity; or None."""
         length = self.mean_length
         if length is None:
             return None
@@ -91,7 +91,7 @@ class Group:
 
 
 def group_columns(contents: Contents) -> list[Group]:
-    """Return all groups of a recording, in the order of its tables."""
+    """Return the gyros, accelerometers and temperatures of a recording, by table."""
     recognised: list[Group] = []
     for table in contents.tables:
         if table.fault is None:
@@ -305,7 +305,7 @@ def choose_columns(contents: Contents) -> Choice:
 
 
 def find_imus(contents: Contents) -> list[tuple[str, ...]]:
-    """Return the topics of each IMU of a log: a gyro, and the accelerometer nearest in name."""
+    """Return the topics of each IMU of a log: its gyro, and the accelerometer of closest name."""
     able = [group for group in group_columns(contents) if not _explain_rejection(group)]
     gyros = {group.table.name: group for group in able if group.quantity == "gyro"}
     accels = {group.table.name: group for group in able if group.quantity == "accel"}
@@ -389,7 +389,7 @@ _COUNT_TOLERANCE = 0.06
 
 
 def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
-    """Draft a sensor file from the contents of a recording; ``model``: name of the sensor."""
+    """Draft a sensor file for a recording; ``model``: name of the sensor, None: of the log."""
     choice = choose_columns(contents)
     usable = (table.file_format for table in contents.tables if table.fault is None)
     vendor = next((made.vendor for made in usable if made.vendor), "unknown")

@@ -56,7 +56,7 @@ _SHORT_NAMES: dict[str, tuple[Quantity, int]] = {  # short names, which must be 
 
 @dataclass(frozen=True)
 class Meaning:
-    """Meaning of a name."""
+    """Quantity and axis that the name of a column means."""
 
     quantity: Quantity
     axis: str  # x, y or z; a number for numbered columns; empty if there is none
@@ -66,7 +66,7 @@ class Meaning:
 
 
 def interpret_label(label: str, context: str = "") -> Meaning | None:
-    """Return the meaning of the name of a column of ``context``, or None if it is not inertial."""
+    """Return what a column name in a table named ``context`` means; None if it is not inertial."""
     label = label[:_MAX_LABEL_LENGTH].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
         name, unit = split_unit(label, dimension)
@@ -84,7 +84,7 @@ def interpret_label(label: str, context: str = "") -> Meaning | None:
 
 
 def find_quantity(text: str) -> tuple[Quantity, int] | None:
-    """Return the only quantity in a text, such as the name of a file, and its rank."""
+    """Return the quantity in a text, such as a file name, and its rank; None if none or several."""
     words = split_label(text)
     joined = "".join(words)
     if joined in _BODY_FRAME_RATES | _BODY_FRAME_FORCES:

@@ -29,7 +29,7 @@ class Split:
         return text.split(self.delimiter, MAX_COLUMNS)
 
     def names(self, text: str, width: int | None = None) -> list[str]:
-        """Return the names of a header line; with runs as delimiters, names may have spaces."""
+        """Return the names of a header line; delimited by runs, ``width`` names may have spaces."""
         names = self.cells(text)
         if self.runs and width is not None and len(names) != width:
             apart = _NAME_SEPARATOR.split(text.strip())
@@ -89,7 +89,7 @@ def is_missing(cell: str) -> bool:
 
 
 def is_number(cell: str, decimal: Decimal | None = None) -> bool:
-    """Return whether a cell is a number; with either decimal sign if none is given."""
+    """Return whether a cell is a number; with point or comma if ``decimal`` is None."""
     text = cell.strip()
     if decimal != "." and text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")

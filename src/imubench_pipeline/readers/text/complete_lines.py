@@ -83,11 +83,11 @@ class _Text:
 
 
 class CompleteLines(AbstractContextManager["CompleteLines"]):
-    """A file for reading that ends with the last complete line, also if it is compressed and cut.
+    """A readable file object with the complete lines of a log, which may be cut or compressed.
 
     The text after the last line break may lack digits: it is left out with a finding. ``skipped``:
-    bytes to skip. ``records``: converts complete lines to the text that is read. ``most``: bytes
-    after which reading stops.
+    bytes to skip. ``records``: function that converts complete lines to the text that `read`
+    returns. ``most``: bytes after which reading stops.
     """
 
     closed = False
@@ -162,8 +162,8 @@ class CompleteLines(AbstractContextManager["CompleteLines"]):
             if len(self.rest) > MAX_LINE_LENGTH:
                 shown = self.rest[:40].decode("utf-8", "replace")
                 raise RecordingError(
-                    f"{self._path.name}: no line break in {MAX_LINE_LENGTH} bytes from {shown!r}; "
-                    "expected shorter lines: this is no text log, or not one record a line"
+                    f"{self._path.name}: no line break in {MAX_LINE_LENGTH} bytes, which begin "
+                    f"with {shown!r}; expected one record per line: export the log as CSV"
                 )
             return b""
         lines = b"".join((self.rest, memoryview(block)[:cut]))
@@ -194,7 +194,7 @@ def describe_missing_text(path: Path) -> str:
 
 
 def read_first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
-    """Yield the lines of a log, the last perhaps without line break; ``most``: bytes to read."""
+    """Yield the lines in the first ``most`` bytes of a log; the last may lack its line break."""
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_READ_BLOCK):
             yield from (line + b"\n" for line in block[:-1].split(b"\n"))
@@ -218,9 +218,10 @@ _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 class Records:
     """Removes everything but the records from the lines of a file.
 
-    ``preamble``: lines before the first record, which a restarted logger repeats. ``runs``: of
-    spaces or tabs become one space. ``blank_is_missing``: a blank line is a cell. ``labels``: of
-    the values of each record, which are removed.
+    ``comments``: prefixes of comment lines. ``header``: the line of names. ``preamble``: lines
+    before the first record, which a restarted logger repeats. ``runs``: whether runs of spaces or
+    tabs become one space. ``blank_is_missing``: whether a blank line is a record with a missing
+    value. ``labels``: names before the values of each record, to be removed.
     """
 
     def __init__(
@@ -297,8 +298,8 @@ class Records:
             return b""
         if self._blank > _MAX_BLANK_LINES:
             raise RecordingError(
-                f"{self._blank} blank lines follow each other among the records; expected a log "
-                "without blank lines: cut the file there"
+                f"{self._blank} consecutive blank lines between two records; expected a log "
+                "without blank lines: cut the file before them"
             )
         before = _MISSING_CELL * self._blank
         self._blank = after - 1

@@ -63,7 +63,7 @@ class CsvFile(LogFile):
                 self.units[name] = unit
             if time is not None and at in time.types:
                 raise RecordingError(
-                    f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
+                    f"{self.path.name}: column {layout.names[at]!r} is used both for time and for "
                     f"{name}; mend 'column' of one of them in the sensor file"
                 )
         yield from self._batches(layout, columns, time)
@@ -195,9 +195,9 @@ class CsvFile(LogFile):
             text = "a quote is opened that is not closed on its line; expected one record a line"
         value = _ARROW_VALUE.search(text)
         if row is None or column is None or value is None:
-            return RecordingError(f"{self.path.name}: not read as columns: {text[:300]}; {_ADVICE}")
+            return RecordingError(f"{self.path.name}: cannot be read: {text[:300]}; {_ADVICE}")
         position = int(column[1])
-        expected = f"a number with {layout.decimal!r} before its decimals, or nothing"
+        expected = f"a number with the decimal sign {layout.decimal!r}, or an empty cell"
         if time is not None and position in time.types:
             expected = time.expected
         line = self._line(int(row[1]), layout, blank=True)

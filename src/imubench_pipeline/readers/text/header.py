@@ -17,7 +17,7 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
 
 def find_header(lines: Sequence[Sequence[str]]) -> int | None:
-    """Return the index of the line with the most names of columns, the first of equals, or None.
+    """Return the index of the (first) line with the most column names, or None.
 
     ``lines``: the cells of each line before the first record; empty if it is not split like the
     record.
@@ -41,7 +41,7 @@ def has_units(cells: Sequence[str]) -> bool:
 
 
 def complete_names(names: list[str], record: list[str]) -> list[str]:
-    """Return a name for each cell of a record, or nothing; one may end with a delimiter."""
+    """Return a name for each cell of a record; empty if more than a final delimiter differs."""
     if len(names) == len(record) + 1 and not names[-1]:
         return names[:-1]
     if len(names) + 1 == len(record) and not record[-1].strip():
@@ -57,7 +57,7 @@ def is_heading(cells: Sequence[str]) -> bool:
 
 
 def are_units(row: list[str], places: set[int]) -> bool:
-    """Return whether a line below the header has units or is a ruling line, without numbers."""
+    """Return whether a line below the header has only texts at ``places``, or is a ruling line."""
     if all(_RULE.fullmatch(cell.strip()) for cell in row):
         return True
     cells = [row[place].strip() for place in places if place < len(row)]
@@ -70,7 +70,7 @@ _SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}  # the second is of ea
 
 
 def is_simulated(lines: Iterable[str]) -> bool:
-    """Return whether a line is the mark of a simulated log, but for quotes and empty cells."""
+    """Return whether a line is the mark of a simulated log, apart from quotes and empty cells."""
     return any(
         line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _SIMULATED_MARKS
         for line in lines

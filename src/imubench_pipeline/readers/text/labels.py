@@ -38,13 +38,13 @@ class Labels:
         return re.compile(rb"^[ \t]*+" + stamp + rb"[ ,;|\t]*+" + joined + rb"[ ,;|\t]*+\r?$", re.M)
 
     def remove(self, lines: bytes) -> bytes:
-        """Return lines with the records as CSV; others are left as they are."""
+        """Return the lines with each record as CSV, without labels; other lines are unchanged."""
         count = len(self.names) + self.stamped
         return self.pattern.sub(b",".join(rb"\%d" % (n + 1) for n in range(count)), lines)
 
 
 def find_labels(lines: Sequence[str]) -> Labels | None:
-    """Return the labels that most lines have; None if they have none, or are too long."""
+    """Return the labels that most lines have in common; None if most have none, or too many."""
     counts: Counter[Labels] = Counter()
     for line in lines:
         stamp = _STAMP.match(line)
@@ -62,9 +62,9 @@ def find_labels(lines: Sequence[str]) -> Labels | None:
 
 
 def find_sentence(lines: Sequence[str]) -> str | None:
-    """Return a line of words and values, if most lines are such lines with other words; or None.
+    """Return one of the lines if most are sentences for people, such as ``Temp: 21.5 C``; or None.
 
-    Such lines are the output of examples for people: a quantity on each line, with its unit.
+    Example programs print such lines: one quantity on each, with its unit.
     """
     found = []
     for line in lines:

@@ -54,7 +54,7 @@ class TextLayout:
     labels: Labels | None = None  # labels before the values of each record
 
     def position(self, column: Column, key: str) -> int:
-        """Return the position, from 0, of a column; raise `RecordingError` if none, or two."""
+        """Return the position of a column, from 0; `RecordingError` if missing or ambiguous."""
         shown = [name[:_MAX_SHOWN_LENGTH] for name in self.names[:_MAX_SHOWN_NAMES]]
         present = ", ".join(shown) + (", ..." if len(self.names) > _MAX_SHOWN_NAMES else "")
         if isinstance(column, int):
@@ -72,8 +72,8 @@ class TextLayout:
             )
         if self.names.count(column) > 1:
             raise RecordingError(
-                f"{self.file}: column {column!r} for {key} stands twice in the header ({present}); "
-                "take it by its position, as a number"
+                f"{self.file}: column {column!r} for {key} occurs twice in the header ({present}); "
+                "give its position instead, as a number"
             )
         return self.names.index(column)
 
@@ -98,9 +98,10 @@ class _Line:
 def find_layout(
     path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
 ) -> TextLayout:
-    """Return the layout of a text log; raise `RecordingError` if it is no text.
+    """Return the layout of a text log; raise `RecordingError` if the file is not text.
 
-    ``figures``, ``times``: required columns, by name or position; none: the most plausible layout.
+    ``figures``, ``times``: required columns of numbers and of time, by name or position. If both
+    are empty, the most plausible layout is returned.
     """
     return _Search(path, log, figures, times).layout()
 
@@ -122,7 +123,7 @@ class _Search:
         self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
-            skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
+            skipped = f" after {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
             fault = complete_lines.describe_missing_text(path)
             raise RecordingError(f"{self._file}: {fault}; expected lines of a log{skipped}")
         self._labels = None if log.delimiter is not None else self._find_labels()
@@ -136,7 +137,7 @@ class _Search:
         if (labels := find_labels(texts)) is None:
             if (sentence := find_sentence(texts)) is not None:
                 raise RecordingError(
-                    f"{self._file}: its lines are text for reading, such as "
+                    f"{self._file}: its lines are text for people, such as "
                     f"{sentence.strip()[:60]!r}, as Adafruit's examples and 'rostopic echo' print "
                     "them; expected one record per line: print CSV in the sketch "
                     "(Serial.print(micros()); Serial.print(','); Serial.print(g.gyro.x, 6); ... "
@@ -166,7 +167,9 @@ class _Search:
         split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:
-            raise RecordingError(f"{self._file}: no record after the comments; expected some")
+            raise RecordingError(
+                f"{self._file}: no record after the comments; expected some: mend 'comment'"
+            )
         header, first = self._header_and_first(split, comments, lines)
         for line in lines[: first + 1]:
             refuse_binary(self._file, line.number, line.raw)
@@ -178,7 +181,7 @@ class _Search:
         if len(names) > MAX_COLUMNS:
             raise RecordingError(
                 f"{self._file}, line {record.number}: more than {MAX_COLUMNS} columns with "
-                f"delimiter {split}; expected one record a line: write the log so, or mend "
+                f"delimiter {split}; expected one record per line: write the log again, or mend "
                 "'delimiter' in the sensor file"
             )
         passed_over = self._passed_over(split, header, lines[:first])
@@ -328,7 +331,7 @@ class _Search:
         if not self._wanted:
             if not alike:
                 raise RecordingError(
-                    f"{self._file}: no line of figures; expected the text of a log"
+                    f"{self._file}: no line of numbers; expected a log with one record per line"
                 )
             record = rows[first]
             near = [line for line in comments if line.number < lines[first].number] + lines[:first]
@@ -415,7 +418,7 @@ _INTEGER = re.compile(r"\s*[-+]?\d+")
 
 
 def refuse_other_formats(file: str, line: bytes) -> None:
-    """Raise `RecordingError` if the first line of a log is one of a web page or JSON."""
+    """Raise `RecordingError` if the first line of a log belongs to a web page or to JSON."""
     begin = line.strip().lower()
     shown = line.strip()[:40].decode("utf-8", "replace")
     if begin.startswith(_MARKUP_PREFIXES):
@@ -446,17 +449,16 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
             "or UTF-16 with its mark: save the text in one of these"
         )
     raise RecordingError(
-        f"{file}, line {number}: holds {zeros} zero byte{'s' if zeros > 1 else ''}, as binary data "
-        "do; expected text: state the 'reader' of the file, or, if zeros hide the beginning of a "
-        "log, cut the file behind that line"
+        f"{file}, line {number}: has {zeros} zero byte{'s' if zeros > 1 else ''}, as binary data "
+        "do; expected text: state 'reader' in the sensor file or, if a text log begins after the "
+        "zeros, delete the lines up to this one"
     )
 
 
 def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequence[str]]) -> None:
-    """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
+    """Raise `RecordingError` if commas may be delimiters or decimal signs, as in ``1,05,2,37``.
 
-    Decimals have no sign and sometimes begin with 0, unlike integers, unless all of these are
-    padded.
+    Decimals have no sign and sometimes begin with 0. Integers do not, unless they are padded.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return
@@ -465,9 +467,9 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
         return
     if _are_padded(part for _, part in pairs) and not _are_padded(whole for whole, _ in pairs):
         raise RecordingError(
-            f"{file}, line {number}: {line[:60]!r} is whole numbers between commas, or has decimal "
-            "commas; expected 'decimal: \",\"' in the sensor file for these, and "
-            "'delimiter: \",\"' for those"
+            f"{file}, line {number}: {line[:60]!r} has integers between commas, or numbers with "
+            "decimal commas; state 'delimiter: \",\"' in the sensor file for integers, or "
+            "'decimal: \",\"' for decimal commas"
         )
 
 

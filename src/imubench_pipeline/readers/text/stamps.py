@@ -163,7 +163,7 @@ _FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
 def find_stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns of the shortest time span that all stamps match."""
+    """Return the patterns that match all stamps and give the shortest time span; may be empty."""
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
         _MIN_STAMP_LENGTH <= len(stamp) <= _MAX_STAMP_LENGTH for stamp in stamps
@@ -196,8 +196,8 @@ _INTEGER = re.compile(r"-?\d{1,19}")
 class TextTime:
     """Converts the stamps of a text log to seconds.
 
-    ``types``: for pyarrow, by column position; a separate column of dates comes first.
-    ``expected``: for messages.
+    ``types``: pyarrow types by column position; a separate column of dates comes first.
+    ``expected``: description of a stamp, for messages.
     """
 
     _text: TextStamps | None = None
@@ -213,7 +213,7 @@ class TextTime:
         self.types = dict.fromkeys(positions, self._type(present))
         daily = self._text is not None and not self._text.dated
         self._clock = Clock(file, DAY if daily else source.wraps, self._started)
-        self.expected = f"a time stamp as {source.format or source.unit!r}"
+        self.expected = f"a time stamp in {source.format or source.unit!r}"
         if present:
             self.expected += f", like {present[0]!r}"
 
