@@ -38,7 +38,7 @@ def test_a_log_that_takes_too_long_is_rejected(tmp_path: Path) -> None:
     found = ingest_as_planned(slow(tmp_path), settings, "s", "log", tmp_path / "kept", guarded=True)
     assert found.recording.status == "rejected"
     reason = found.recording.reason
-    assert reason.startswith("log.bag: to read its first records took more than 0.")
+    assert reason.startswith("log.bag: reading its first records took more than 0.")
     assert "quality.opening" in reason
 
 

@@ -278,7 +278,9 @@ def test_a_rate_that_contradicts_the_stamps_is_a_finding() -> None:
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3])
 def test_a_wrong_unit_of_time_is_told(factor: float) -> None:
-    with pytest.raises(RecordingError, match="'unit' of 'time' is probably another"):
+    with pytest.raises(
+        RecordingError, match="'unit' of 'time' in the sensor file is probably wrong"
+    ):
         found(GRID * factor, stated=100.0)
 
 
@@ -302,7 +304,7 @@ def test_ten_thousand_segments_are_taken_and_no_more(
     base, _ = found(clock[:-5])
     assert len(base.segments) == 10_000
     assert ("jittered_stamps" in names(base)) == jittered
-    with pytest.raises(RecordingError, match="10001 segments, expected 10000 at most"):
+    with pytest.raises(RecordingError, match="10001 segments; expected at most 10000"):
         found(clock)
 
 

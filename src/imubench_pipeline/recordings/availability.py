@@ -29,14 +29,12 @@ _ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
 
 @contextmanager
 def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
-    """Let a `RecordingError` pass only where it is a property of the log, which may change.
+    """Pass on a `RecordingError` only if the log causes it, and not its disk or a change meanwhile.
 
     Yields a function that returns whether the log is unchanged. ``planned``: files that the plan
-    found.
-
-    Raises RecordingError if the path itself cannot be used; UnavailableError if the log is not
-    there, cannot be read for a reason outside of it, or changed while it was rejected; OSError if a
-    disk is full, or there are too many open files.
+    found. Raises RecordingError if the path itself cannot be used; UnavailableError if the log is
+    not there, cannot be read for a reason outside of it, or changed while it was rejected; OSError
+    if a disk is full, or there are too many open files.
     """
     try:
         before = read_identity(source)
@@ -45,9 +43,9 @@ def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[
             raise _unavailable(source, error) from None
         raise RecordingError(f"{source.name}: cannot be read ({error.strerror})") from None
     if absent := sorted({*planned} - {*before}):
-        raise UnavailableError(f"{source.name}: {absent[0]} is not there any more")
+        raise UnavailableError(f"{source.name}: {absent[0]} is not there any more; run again")
     if before.keys() == {"."} and source.is_dir():
-        raise RecordingError(f"the folder {source.name!a} has no files")
+        raise RecordingError(f"the folder {source.name!a} has no files; expected a log in it")
     try:
         yield lambda: _identity(source) == before
     except (RecordingError, OSError) as raised:
@@ -62,7 +60,7 @@ def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[
                     raise _unavailable(source, cause) from None
             cause = cause.__cause__ or cause.__context__
         if isinstance(raised, RecordingError) and _identity(source) != before:
-            reason = f"{source.name}: changed while it was read, was replaced, or was not available"
+            reason = f"{source.name}: was changed, replaced or absent while it was read; run again"
             raise UnavailableError(reason) from None
         raise
 
@@ -85,22 +83,22 @@ _SLOWEST = 5e6
 
 
 def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
-    """Read the first records of each file of a recording (file or folder), and no more.
+    """Check that the first records of each file of a recording (file or folder) can be read.
 
-    ``seconds``: how long it may take, and a second more for each 5 MB of the log. Raises
-    RecordingError if they cannot be read, or that takes longer or more than 512 MiB, or crashes;
-    OSError if the log is not there, or its disk does not answer in that time.
+    ``seconds``: time limit, to which 1 s is added for each 5 MB of the log. Raises RecordingError
+    if the records cannot be read, or reading takes longer, takes more than 512 MiB, or crashes;
+    OSError if the log is not there, or its disk does not answer in time.
     """
     size = sum(path.stat().st_size for path in log_files(source))
     try:
         run_bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
     except BoundError as error:
         if error.is_external:
-            raise UnavailableError(f"{source.name}: to read its first records {error}") from None
+            raise UnavailableError(f"{source.name}: reading its first records {error}") from None
         raise RecordingError(
-            f"{source.name}: to read its first records {error}; expected the log of an "
-            "inertial sensor: copy what it measured into a file of its own, or allow more in "
-            "quality.opening"
+            f"{source.name}: reading its first records {error}; expected the log of an inertial "
+            "sensor: copy its data into a separate file, or increase quality.opening in the "
+            "configuration"
         ) from None
 
 
@@ -112,4 +110,4 @@ def _read_first_records(source: Path, log: LogFormat) -> None:
         except (RecordingError, OSError, MemoryError):
             raise
         except Exception:
-            return  # who reads it meets the same, and says where
+            return  # the ingest meets the same error, and reports it

@@ -51,8 +51,8 @@ class Recording:
     def inputs(self) -> list[Path]:
         """Files whose date decides whether Snakemake reads the recording again.
 
-        The settings of the ingest have the content of logs and notes. The file of a recording that
-        is held back does not exist but its results do: Snakemake leaves them.
+        Changes of logs and notes show in the settings of the ingest instead. A recording that is
+        held back has an input that does not exist: Snakemake leaves its results as they are.
         """
         if self.held_back:
             return [self.path / "held back"]
@@ -70,7 +70,7 @@ class FoundFile:
 
 
 def find_logs(logs: Path) -> list[Recording]:
-    """Return the recordings of a drop zone, in order; an error if in no folder of a sensor."""
+    """Return the recordings in a drop zone, sorted; ``error`` is set if outside a sensor folder."""
     recordings: list[Recording] = []
     for path in _shown(logs):
         if path.is_dir():
@@ -80,7 +80,7 @@ def find_logs(logs: Path) -> list[Recording]:
         elif _is_log(path):
             fault = _fault(path, _stem(path)) or (
                 f"{path.name} lies beside the folders of the sensors; expected it in "
-                f"{logs / '<sensor>'}, a folder of the name of its sensor file: move it there"
+                f"{logs / '<sensor>'}, the folder with the name of its sensor file: move it there"
             )
             name = get_recording_name(path.name)
             recordings.append(Recording(NO_SENSOR, name, path, None, simulated=False, error=fault))
@@ -90,7 +90,10 @@ def find_logs(logs: Path) -> list[Recording]:
 def account_for(
     logs: Path, recordings: Iterable[Recording], held_back: Iterable[Recording] = ()
 ) -> list[FoundFile]:
-    """Return every file once, with its recording, or why it is skipped, such as ``held_back``."""
+    """Return every file in a drop zone once, with its recording, or the reason why it is skipped.
+
+    ``held_back``: recordings that are still written; their files are skipped.
+    """
     owners = {file: recording for recording in recordings for file in recording.files}
     waiting = {file for recording in held_back for file in recording.files}
     found = []
@@ -204,7 +207,7 @@ def _is_dangling(path: Path) -> bool:
 
 
 def _behind_link(path: Path, sensor: str, name: str) -> Recording:
-    reason = f"{path.name}: cannot be read (No such file or directory): it links to nothing now"
+    reason = f"{path.name}: cannot be read (No such file or directory): its target is missing now"
     return Recording(sensor, _usable(name), path, None, simulated=False, unavailable=reason)
 
 
@@ -239,9 +242,9 @@ def _fault(path: Path, name: str) -> str | None:
     for what, name_shown, stem in (("file", shown, name), ("folder", ascii(folder), folder)):
         if _usable(stem) != stem:
             return (
-                f"the {what} name {cut(name_shown, str)} cannot be used; expected at most "
-                f"{_LONGEST_NAME} letters ({_MOST_BYTES} bytes), digits, spaces and . _ - + ( ) in "
-                f"it, and no end that repeats itself: rename the {what}"
+                f"the {what} name {cut(name_shown, str)} cannot be used; expected letters, digits, "
+                f"spaces and . _ - + ( ), {_LONGEST_NAME} characters ({_MOST_BYTES} bytes) at "
+                f"most, and no end that repeats 20 times: rename the {what}"
             )
     try:
         if _holds_itself(path):
@@ -252,12 +255,12 @@ def _fault(path: Path, name: str) -> str | None:
     except OSError:  # the ingest meets the same error, and reports it
         return None
     if not files:
-        return f"the folder {shown} has no files"
+        return f"the folder {shown} has no files; expected a log in it"
     for file in files:
         try:
             file.name.encode()
         except UnicodeEncodeError:
-            return f"{shown} holds a file of the name {file.name!a}: rename it in UTF-8"
+            return f"{shown} has a file {file.name!a}, whose name is not UTF-8: rename it"
     return None
 
 

@@ -36,7 +36,7 @@ Doubted = TypeVar("Doubted", bound=TableRow)
 def derive_doubts(
     findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
 ) -> Iterator[DoubtRow]:
-    """Yield doubts about recordings, the most serious first, from recommended ``parameters``."""
+    """Yield the doubts from findings and recommended estimates, the most serious ones first."""
     every: list[DoubtRow] = []
     for finding in findings:
         code = finding.finding
@@ -86,14 +86,14 @@ def derive_doubts(
 def doubt_unsold_sensors(
     recordings: Iterable[RecordingRow], sensors: Collection[str]
 ) -> Iterator[DoubtRow]:
-    """Yield a doubt for each recording of sensors not for sale, which are not compared."""
+    """Yield a doubt for each recording of ``sensors``, which are not for sale."""
     for row in recordings:
         if row.sensor in sensors:
             yield _doubt(row, "not_sold", texts.NOT_SOLD, unfit=True)
 
 
 def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[DoubtRow]:
-    """Yield a doubt for each simulated recording, where any measured one was analysed."""
+    """Yield a doubt for each simulated recording, if any measured recording was analysed."""
     reason = texts.SIMULATED_BESIDE_MEASURED
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
@@ -104,9 +104,9 @@ def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[D
 def exclude_simulated(
     recordings: Sequence[RecordingRow],
 ) -> tuple[list[RecordingRow], list[DoubtRow]]:
-    """Return the recordings of all sensors with new verdicts, and the new doubts.
+    """Return the recordings, the simulated ones excluded if any was measured, and the new doubts.
 
-    A simulated recording of one sensor decides until a measured one of another sensor is known.
+    Comparisons use simulated recordings only until a measured recording of any sensor is known.
     """
     known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
     new = [doubt for doubt in doubt_simulated_recordings(recordings) if _key(doubt) not in known]
@@ -126,7 +126,7 @@ def exclude_simulated(
 
 
 def judge_fitness(of_recording: Iterable[DoubtRow]) -> Fitness:
-    """Return the verdict on a recording from all doubts about it."""
+    """Return whether a recording is fit for comparisons, from all doubts about it."""
     of_log = [doubt for doubt in of_recording if doubt.code != "doubtful"]
     if any(doubt.fitness == "unfit" for doubt in of_log):
         return "unfit"
@@ -136,7 +136,10 @@ def judge_fitness(of_recording: Iterable[DoubtRow]) -> Fitness:
 def judge_recordings(
     recordings: Sequence[RecordingRow], doubts: Iterable[DoubtRow], included: Collection[str]
 ) -> list[RecordingRow]:
-    """Return the recordings with their doubts, and whether they decide, as ``included`` ones do."""
+    """Return the recordings with their doubts, and whether comparisons use them (``decides``).
+
+    ``included``: recordings, as ``sensor/recording``, that are used in spite of doubts.
+    """
     by_recording: dict[Key, list[DoubtRow]] = defaultdict(list)
     for doubt in doubts:
         by_recording[_key(doubt)].append(doubt)
@@ -152,7 +155,7 @@ def judge_recordings(
 
 
 def mark_doubts(of_recording: Iterable[DoubtRow]) -> tuple[DoubtMark, ...]:
-    """Return the codes of the doubts of a recording with channels, the most serious first."""
+    """Return the codes of the doubts about a recording, in their order, with the channels."""
     channels: dict[tuple[str, str], dict[str, None]] = {}
     for doubt in of_recording:
         if doubt.code != "doubtful":
@@ -172,7 +175,7 @@ def list_excluded(recordings: Iterable[RecordingRow]) -> dict[Key, tuple[DoubtMa
 
 
 def mask_excluded(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Iterator[Estimated]:
-    """Yield rows of estimates, without values (a mean is NaN) of recordings that do not decide."""
+    """Yield rows of estimates; recordings in ``not_deciding`` lose their values (biases: NaN)."""
     for row in rows:
         if _key(row) not in not_deciding:
             yield row
@@ -187,7 +190,10 @@ def attach_doubts(
     recordings: Iterable[RecordingRow],
     named: Collection[tuple[str, str]] = (("sensor", "recording"),),
 ) -> Iterator[Doubted]:
-    """Yield rows with the doubts about the recordings in their columns ``named``."""
+    """Yield each row with the doubts about the recordings that it names.
+
+    ``named``: pairs of columns with sensor and recording. Doubts of the row are replaced.
+    """
     by_recording: dict[tuple[str, str | None], list[str]] = {
         _key(row): [doubt.code for doubt in row.doubts] for row in recordings
     }
@@ -200,7 +206,7 @@ def attach_doubts(
 def attach_doubts_to_pools(
     pools: Iterable[PooledRow], recordings: Iterable[RecordingRow]
 ) -> Iterator[PooledRow]:
-    """Yield pools with the doubts of the recordings of sensor or device."""
+    """Yield each pool with the doubts about the recordings of its sensor, or of its device."""
     listed = [row for row in recordings if row.decides and row.doubts]
     for row in pools:
         own = (

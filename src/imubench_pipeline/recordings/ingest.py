@@ -89,11 +89,11 @@ def ingest(
     folder: Path,
     names: LogNames,
 ) -> Ingested:
-    """Read a recording, a log file or a folder, and store it as Parquet in ``folder``.
+    """Read a recording (a log file or a folder) and store it as Parquet in ``folder``.
 
-    Files of an earlier run are replaced. ``names`` are stored in the metadata of every file; their
-    kind says whether the sensor was at rest: knocks and changes are looked for then alone. Raise
-    `RecordingError` if the recording cannot be used; nothing is left in ``folder`` then.
+    Files of an earlier run are replaced. ``names`` are stored in the metadata of every file. Knocks
+    and changes are searched for only if ``names.kind`` is at rest. Raises `RecordingError` if the
+    recording cannot be used; no samples are then left in ``folder``.
     """
     folder.mkdir(parents=True, exist_ok=True)
     remove_kept(folder)
@@ -138,7 +138,7 @@ def _choose_part(
 
 
 def remove_kept(folder: Path) -> None:
-    """Remove the log of an earlier run, and the scratch files of a killed one."""
+    """Remove the samples of an earlier run, and the scratch files of a killed one."""
     for path in list_log_files(folder):
         path.unlink()
     for path in folder.glob(".ingest.*.part"):
@@ -371,12 +371,12 @@ def _complete_row(
 def ingest_as_planned(
     source: Path, settings: str, sensor: str, recording: str, folder: Path, *, guarded: bool = False
 ) -> Quality:
-    """Ingest a recording by its plan; reject an unusable one, with the reason.
+    """Ingest a recording by its plan; an unusable recording is rejected, with the reason.
 
-    The settings are from `imubench_pipeline.run.plan.Plan.ingest_settings`. ``guarded``: a process
-    of its own opens the log first (`availability.check_opening`), so that none that hangs or
-    crashes its reader does so here; it takes 0.1 s. Raise `UnavailableError` if the log cannot be
-    read now, for a reason outside of it.
+    ``settings`` are from `imubench_pipeline.run.plan.Plan.ingest_settings`. ``guarded``: whether a
+    separate process opens the log first (`availability.check_opening`, 0.1 s), since a log may hang
+    or crash its reader. Raises `UnavailableError` if the log cannot be read now, for a reason
+    outside of it.
     """
     plan = IngestPlan.model_validate_json(settings)
     notes = plan.notes or RecordingNotes()
@@ -460,9 +460,9 @@ def assemble(
     metadata: LogMetadata,
     path: Path,
 ) -> tuple[Path, dict[str, int]]:
-    """Write the columns of files that share a clock to ``path``, unless one can be used unchanged.
+    """Write the columns of files that share a clock to ``path``, unless one uniform file is enough.
 
-    Return the path, and the samples of each column that are left out because they repeat a stamp.
+    Returns the path of the data, and how many samples of each column repeat a stamp (left out).
     """
     for part in parts:
         part.writer.finish(asdict(metadata))
@@ -533,6 +533,6 @@ def count_samples(
             )
             left_out = count.knocks + count.interpolated + count.repeated
             if count.present != count.used + left_out:
-                raise RuntimeError(f"samples were lost or invented: {name} {count}")
+                raise RuntimeError(f"{name}: used and omitted samples do not add up: {count}")
             counts[name] = count
     return counts

@@ -41,14 +41,14 @@ class AnalysedChannel(Level, SampleCounts):
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file of samples: size, digest of its metadata, and digest."""
+    """Size in bytes and digests (of the metadata, of the file) of a Parquet file of samples."""
 
     size: int
     footer: str
     sha256: str
 
     def is_removed(self, path: Path) -> bool:
-        """Return whether a file has the metadata of this one, whose samples were removed."""
+        """Return whether a file is what is left of this one after its samples were removed."""
         try:
             sealed = SEAL in read_footer(path) and not is_seal_broken(path)
             return sealed and read_metadata(path).removed == self.sha256
@@ -92,7 +92,7 @@ class Quality:
         write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
-        """Return the fault of the samples in a folder, or None; all is read only with ``whole``."""
+        """Return what is wrong with the samples in a folder, or None; ``whole``: read them all."""
         for name, stated in (self.kept or {}).items():
             path = locate_samples(folder) / name
             try:
@@ -150,10 +150,10 @@ def _footer(path: Path) -> str:
 
 
 def remove_old_samples(folders: Iterable[Path], keep: int) -> tuple[int, int]:
-    """Remove the samples of analysed recordings, except the latest ones of each device.
+    """Remove the samples of analysed recordings, except the ``keep`` latest ones of each device.
 
-    Recordings whose notes name no device count together, by sensor. Returns how many recordings
-    lost their samples, and the size of these, bytes. Altered samples are left as they are.
+    Recordings whose notes name no device count together, by sensor. Altered samples are not
+    removed. Returns the number of recordings and of bytes that were removed.
     """
     devices: dict[tuple[str, str], list[tuple[str, str, Path, Quality]]] = {}
     for folder in folders:
@@ -191,7 +191,7 @@ def load_logs(folder: Path) -> dict[str, ChannelLog]:
     if quality.has_removed_samples(folder):
         raise RecordingError(
             f"{folder}: its samples were removed to save space (samples.keep), and this step needs "
-            "them; run again with the log in the drop zone, and the log is read again"
+            "them; run again with the log in the drop zone to read it again"
         )
     if quality.kept is not None:
         for path in list_log_files(folder):
@@ -201,7 +201,7 @@ def load_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return `load_logs` of a sensor at rest; empty for a turned sensor."""
+    """Return the usable channels of a recording (`load_logs`); none if the sensor was turned."""
     logs = load_logs(folder)
     return logs if was_at_rest(folder) else {}
 
@@ -209,7 +209,7 @@ def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
 def find_static_recordings(
     folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[tuple[RecordingRow, Path]]:
-    """Return the usable static recordings in `folders`: the least `far`, then the longest."""
+    """Return the usable static recordings in ``folders``, by ``far`` (False first), then length."""
 
     def order(recording: tuple[RecordingRow, Path]) -> tuple[Any, ...]:
         row = recording[0]

@@ -49,7 +49,7 @@ class KnownFile:
 
     @classmethod
     def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> "KnownFile":
-        """Read a file, which may be missing; `is_stopped` ends the reading of a large one."""
+        """Return the identity of a file, which may be missing; ``is_stopped`` ends a long read."""
         try:
             begin = time.time_ns()
             before = path.stat()
@@ -82,7 +82,7 @@ def write_known(
 ) -> None:
     """Write the file identities of an ingest to the results of a recording.
 
-    ``versions``: as the plan named them; a file of the plan that is not in ``files`` was not there.
+    ``versions``: of the files in the plan; those that are not in ``files`` are written as absent.
     """
     if versions is not None:
         absent = {name: KnownFile(None, None, None) for name in versions}
@@ -97,7 +97,7 @@ def write_known(
 def identify_log_files(
     source: Path, is_stopped: Callable[[], bool] = lambda: False
 ) -> dict[str, KnownFile]:
-    """Read all files of a log (file or folder); return their identity by their place in the log.
+    """Read all files of a log (file or folder); return their identities, by relative path.
 
     ``is_stopped``: whether digests of large files are not needed any more. Raises OSError.
     """
@@ -121,8 +121,8 @@ def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
 def plan_versions(source: Path, folder: Path) -> dict[str, str]:
     """Return a version of each file of a log; a changed version requires an ingest.
 
-    It stays while the evidence of the last ingest, in ``folder``, holds; new stamps are noted
-    there.
+    A version stays while the file agrees with its identity at the last ingest, in ``folder``. New
+    stamps of an unchanged file are written there.
     """
     known = read_known(folder)
     places: dict[str, Path] = {}

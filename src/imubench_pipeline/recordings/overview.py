@@ -23,7 +23,7 @@ BUCKETS = 400  # default number of intervals of time of an envelope
 BUCKETS_OF_TURNS = 2400  # the same of a recording with turns in it, which should be seen
 MOST_BINS = 120  # bins of a histogram; at least half as many, if there are the levels
 _BINS = 100  # where no steps show
-_DRAWN = 1 << 16  # samples, spread over the recording, that tell the bins of a histogram
+_DRAWN = 1 << 16  # samples, spread over the recording, from which the bins are derived
 _BEYOND = 0.8  # widths of the middle that bins go beyond it: to 6 standard deviations
 _SAME = 0.01  # part of the mean gap between levels within which two are one, written in two ways
 _GOLDEN_RATIO = 0.6180339887498949
@@ -41,9 +41,9 @@ class Overview:
 def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
     """Return envelopes and histograms of a recording; no row if it was rejected.
 
-    Channels that cannot be analysed are left out. The temperature has an envelope alone.
-    ``folder``: of its ``log*.parquet``; ``buckets``: max. intervals of an envelope; None: more if
-    it was turned.
+    Channels that cannot be analysed are left out. The temperature has only an envelope. ``folder``:
+    of its ``log*.parquet``. ``buckets``: largest number of intervals of an envelope; None:
+    `BUCKETS`, or `BUCKETS_OF_TURNS` if the sensor was turned.
     """
     result = Overview([], [])
     logs = [*kept.open_channel_logs(folder).values()]
@@ -85,13 +85,13 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
 
 
 def bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
-    """Return the points that begin the buckets of a grid, and one past the last."""
+    """Return the first grid point of each bucket, and the end of the last one, shape (b + 1,)."""
     number = min(buckets, grid)
     return np.array([grid * i // number for i in range(number + 1)], dtype=np.int64)
 
 
 def no_figures(edges: NDArray[np.int64]) -> Array:
-    """Return least, largest, sum and number of no samples in each bucket, shape (b, 4)."""
+    """Return minimum, maximum, sum and number of samples of empty buckets, shape (b, 4)."""
     return np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
 
 
@@ -108,9 +108,10 @@ def envelope_rows(key: Key, times: Array, figures: Array) -> Iterator[EnvelopeRo
 def bin_edges(drawn: Array, low: float, high: float) -> Array:
     """Return the edges of the bins of a histogram, SI, increasing, shape (n + 1,).
 
-    ``drawn``: samples that stand for all, SI; ``low``, ``high``: extremes of all. The bins are
-    equally wide, over some 6 standard deviations either side; the outer ones end at the extremes.
-    Where the samples have steps, a bin holds a whole number of levels. All equal: two equal edges.
+    ``drawn``: some of the samples, SI; ``low``, ``high``: extremes of all samples. The bins are
+    equally wide, over some 6 standard deviations on either side; the outermost ones end at the
+    extremes. If the samples are quantised, each bin has a whole number of levels. If all samples
+    are equal, two equal edges are returned.
     """
     if low == high:
         return np.array([low, high])
@@ -162,7 +163,7 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
 
 @njit(cache=True, nogil=True)
 def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
-    """Add values from grid point ``reached`` on to the figures, shape (b, 4), of their buckets."""
+    """Add values, the first at grid point ``reached``, to ``figures`` of their buckets, (b, 4)."""
     bucket, begin = 0, 0
     while edges[bucket + 1] <= reached:
         bucket += 1

@@ -76,7 +76,8 @@ def open_part(
 ) -> Iterator[tuple[Part, Callable[[Array | None, Mapping[str, Array]], None]]]:
     """Begin a part with scratch files of this ``name``; yield it with a function that writes it.
 
-    The function writes consecutive records and adds them to the statistics: stamps, s, and samples.
+    The function takes the stamps, s, or None, and the columns of consecutive records. It writes
+    them and adds them to the statistics.
     """
     data, stamps, absent = (
         scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "absent")
@@ -111,9 +112,9 @@ def open_part(
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
-    """Read one file of a recording, in bounded memory; its number names the files in ``scratch``.
+    """Read one file of a recording, in bounded memory; ``number`` names its files in ``scratch``.
 
-    Raises RecordingError if that fails, or no sample lies in the part to use.
+    Raises RecordingError if the file cannot be read, or no sample lies in the part ``use``.
     """
     rate = file.log.rate_hz
     read_rows = 0
@@ -134,7 +135,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
-            f"(use: start {use.start} s, end {use.end or 'open'})"
+            f"(use: start {use.start} s, end {use.end or 'open'}); mend 'use' in the notes"
         )
     if not_used:
         file.note(NotUsed(file.path.name, not_used), not_used, "note")
@@ -146,8 +147,8 @@ def leave_out_disturbed(
 ) -> dict[str, list[knocks.Knock]]:
     """Replace knocks and interpolated samples by NaN in the file of a part.
 
-    Returns the knocks by column. ``sigmas``: their least distance from the level, in standard
-    deviations. ``longest``: in records.
+    Returns the knocks by column. ``sigmas``: least distance of a knock from the level, in standard
+    deviations. ``longest``: longest knock, in records.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(knocks.find_outlier_blocks(b, sigmas)[0])]

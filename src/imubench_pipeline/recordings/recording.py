@@ -36,7 +36,7 @@ _NOT_CHANNELS = BESIDE | {"time", "sample"}
 
 @dataclass(frozen=True, kw_only=True)
 class LogNames:
-    """The recording of a file of samples."""
+    """Names and kind of the recording that a file of samples belongs to."""
 
     sensor: str = ""
     device: str = ""
@@ -47,7 +47,7 @@ class LogNames:
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file of a log."""
+    """Name, size in bytes, and digest of a file of a log."""
 
     name: str
     size: int | None
@@ -79,7 +79,7 @@ _METADATA_ADAPTER = TypeAdapter(LogMetadata)  # once: it takes milliseconds
 
 @dataclass(frozen=True, kw_only=True)
 class SampleCounts:
-    """Samples of a column: present in the log, used, and left out."""
+    """Numbers of samples of a column: present in the log, used, and left out by reason."""
 
     present: int
     used: int
@@ -165,11 +165,11 @@ class ChannelLog:
     segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
     holes: bool  # samples are missing: blocks have NaN in their place
     temperature: bool = False  # there are readings of the temperature on the same grid
-    position: bool = False  # there is a column on the same grid that says how the sensor stood
+    position: bool = False  # a column on the same grid has the position of the sensor
     table_rate: bool = False  # a column on the same grid has the rate of the rate table
 
     def blocks(self) -> Iterator[Array]:
-        """Yield the samples on the grid in SI, by block; NaN if missing; or RecordingError."""
+        """Yield the samples on the grid, SI, in blocks; NaN if missing. Or raise RecordingError."""
         try:
             with open_parquet(self.path) as file:
                 placed = "sample" in file.schema_arrow.names
@@ -236,7 +236,7 @@ def read_metadata(path: Path) -> LogMetadata:
 
 
 def remove_samples(path: Path, sha256: str) -> None:
-    """Replace a file of samples, of a SHA-256, by one with its columns and metadata only."""
+    """Replace a file of samples, with digest ``sha256``, by a file without rows."""
     metadata = json.loads(pq.read_metadata(path).metadata[METADATA]) | {"removed": sha256}
     schema = pq.read_schema(path).with_metadata({METADATA: json.dumps(metadata)})
     with replace_file(path) as temporary:
@@ -249,7 +249,7 @@ def list_log_files(folder: Path) -> list[Path]:
 
 
 def locate_samples(folder: Path) -> Path:
-    """Return the folder of these files: a folder of their own if they were in an object store."""
+    """Return the folder of the Parquet files: a subfolder if they were in an object store."""
     own = folder / SAMPLES_FOLDER
     return own if own.is_dir() else folder
 
@@ -290,7 +290,7 @@ def open_channel_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def place_on_grid(blocks: Iterable[Array], grid: int) -> Array:
-    """Return consecutive blocks of a column on a grid of L points, shape (L,); NaN at the end."""
+    """Join consecutive blocks of a column on a grid of L points, shape (L,), padded with NaN."""
     values = np.full(grid, np.nan)
     reached = 0
     for block in blocks:

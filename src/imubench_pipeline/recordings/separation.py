@@ -125,8 +125,8 @@ def separate_clocks(
 ) -> list[Part]:
     """Return one part for each clock of a file, or the part itself if there is only one clock.
 
-    ``stated``: rate of its records, Hz. ``whole`` returns the time base of all records. Raises
-    RecordingError if neither channels nor all records together have a clock.
+    ``stated``: stated rate of the records, Hz. ``whole``: returns the time base of all records.
+    Raises RecordingError if neither channels nor all records together have a clock.
     """
     records = _Records(part, stated, settings)
     channels = [

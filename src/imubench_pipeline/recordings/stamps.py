@@ -114,7 +114,7 @@ class Track:
     grid: int = 0  # number of records, and of grid points up to the last record
     off_grid: int = 0
     duplicates: int = 0
-    unstamped: int = 0  # records between two points, at a used one, without a stamp
+    unstamped: int = 0  # records with a missing or wrong stamp, put on the next grid point
     holes: int = 0
     longest: int = 0
     longest_at: int = 0  # number of holes; length of the longest, first point of it
@@ -169,7 +169,7 @@ class Track:
 
 
 def track_stamps(stamps: Stamps, interval: float, longest_hole: float) -> Track:
-    """Return the track of all stamps of a file."""
+    """Return the grid and its irregularities from all stamps of a file; arguments as in `Track`."""
     track = Track(interval, longest_hole)
     for block in stamps():
         track.follow(block)

@@ -81,8 +81,8 @@ def fit_time_base(
 ) -> TimeBase:
     """Return the time base of a file from its stamps, which are read several times.
 
-    ``stated``: rate, Hz. ``known``: interval, s, if most samples are missing. Raises
-    RecordingError.
+    ``stated``: rate, Hz. ``known``: interval, s, if most samples are missing. Raises RecordingError
+    if the stamps do not advance, their unit is implausible, or too many samples are missing.
     """
     typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
@@ -90,8 +90,8 @@ def fit_time_base(
     interval = typical.mean
     if not _MIN_INTERVAL <= interval <= _MAX_INTERVAL:
         raise RecordingError(
-            f"the time stamps are {interval:.3g} s apart; is 'unit' of 'time' the right one of s, "
-            "ms, us, ns?"
+            f"the time stamps are {interval:.3g} s apart; mend 'unit' of 'time' in the sensor file "
+            "(s, ms, us or ns)"
         )
     if typical.other is not None and _is_rate_of(stated, typical.other, settings):
         interval = typical.other
@@ -102,9 +102,9 @@ def fit_time_base(
         track = tracking.track_stamps(stamps, mean, settings.longest_hole)
     if track.grid > _MAX_EXTRA_POINTS + _MAX_MISSING_PER_SAMPLE * track.rows:
         raise RecordingError(
-            f"of {track.grid} samples at {1.0 / interval:.6g} Hz {track.rows} are there; expected "
-            f"one of {_MAX_MISSING_PER_SAMPLE}: is 'unit' of 'time' the right one? Else cut the "
-            "log at its holes"
+            f"only {track.rows} of {track.grid} samples at {1.0 / interval:.6g} Hz are present; "
+            f"expected at least 1 in {_MAX_MISSING_PER_SAMPLE}: mend 'unit' of 'time' in the "
+            "sensor file, or split the log at its gaps"
         )
     # Many holes with more points than the log has records are pauses of the host, not losses.
     bursts = known is None and track.grid > 2 * track.rows and track.holes > 0.05 * track.rows
@@ -175,8 +175,8 @@ def find_rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has only every second (third, ...) sample.
 
-    ``points``: of the samples on a grid of ``rate``, Hz; below 0: left out. 32 equal steps are no
-    chance.
+    ``points``: grid points of the samples, by block; negative ones are ignored. ``rate``: of the
+    grid, Hz.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -237,9 +237,9 @@ def _describe_grid(track: tracking.Track, interval: float) -> list[Finding]:
 def _check_segments(number: int) -> None:
     if number > _MAX_SEGMENTS:
         raise RecordingError(
-            f"the time stamps jump or stop so often that there are {number} segments, expected "
-            f"{_MAX_SEGMENTS} at most: is the right column named, and 'wraps' where they begin "
-            "again at 0? Else cut the log at its pauses"
+            f"the time stamps jump or stop so often that there are {number} segments; expected at "
+            f"most {_MAX_SEGMENTS}: mend 'column' of 'time' in the sensor file, state 'wraps' if "
+            "the stamps return to 0, or split the log at its pauses"
         )
 
 
@@ -256,8 +256,8 @@ def _compare_rates(rate: float, stated: float | None, settings: QualitySettings)
     thousands = np.log10(rate / stated) / 3.0
     if abs(thousands) > 0.9 and abs(thousands - round(thousands)) < 0.01:
         raise RecordingError(
-            f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
-            "'time' is probably another one of s, ms, us, ns"
+            f"the rate is {rate:.6g} Hz by the stamps, but {stated:.6g} Hz as stated; 'unit' of "
+            "'time' in the sensor file is probably wrong: try another one of s, ms, us, ns"
         )
     return [find(time_base.RateContradictsStamps(stated, rate), "warning", rate)]
 

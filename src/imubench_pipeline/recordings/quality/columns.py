@@ -38,13 +38,13 @@ number of levels, which a drift increases, does not matter."""
 
 
 def estimate_excess_repeats(column: summary.ColumnSummary) -> tuple[float, float]:
-    """Return the share of samples that repeat beyond chance, and the share of pairs by chance.
+    """Return the shares of samples that repeat beyond chance, and of pairs that repeat by chance.
 
     A register that is read faster than it is updated repeats samples, and between the repeats it
-    changes like independent samples. By chance samples repeat for two reasons, of which the larger
-    share is subtracted. Coarse steps: the share of samples that equal the sample `summary.FAR_LAG`
-    before. Low-passed noise: the share of repeats in rounded normal noise with the same share of
-    one-step changes.
+    changes like independent samples. By chance, samples repeat for two reasons; the larger share is
+    subtracted. Coarse steps: the share of samples that equal the sample `summary.FAR_LAG` before.
+    Low-passed noise: the share of repeats in rounded normal noise with the same share of one-step
+    changes.
     """
     pairs, far_pairs = column.pairs, column.far_pairs
     if pairs == 0 or far_pairs == 0:
@@ -146,7 +146,7 @@ def check_columns(
 ) -> list[Finding]:
     """Return the findings about the columns of one file; an unusable channel is fatal.
 
-    ``rate``: Hz. ``static``: the sensor was at rest; changes are not reported if it was turned.
+    ``rate``: Hz. ``static``: whether the sensor was at rest; if not, changes are not reported.
     """
     findings: list[Finding] = []
     usable: dict[str, summary.ColumnSummary] = {}
@@ -318,15 +318,15 @@ class Step:
 
 @dataclass(frozen=True)
 class WarmUp:
-    """A beginning that drifts."""
+    """A drift at the beginning of a log that is larger than any later one."""
 
-    end: int  # record from which the drift is as small as in the rest
+    end: int  # record from which the drift is as small as later
     drift: float  # change of the mean during the warm-up, SI
-    usual: float  # median change over a part of the rest, SI
+    usual: float  # median change over a later part, SI
 
 
 def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
-    """Find sudden changes of the mean by ``sigmas`` robust standard deviations of all steps."""
+    """Return the sudden changes of the mean above ``sigmas`` robust standard deviations."""
     size = max(1, len(blocks.mean) // 400)
     # Medians are robust to knocks. The means of blocks with few samples scatter too much.
     mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
@@ -356,7 +356,7 @@ def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
 
 
 def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
-    """Find a beginning that drifts more than `times` the median drift of the later parts."""
+    """Return the drift at the beginning if above ``times`` the median drift of later parts."""
     size = len(blocks.mean) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None
@@ -378,7 +378,7 @@ def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
 
 
 def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
-    """Return the ratio of largest to smallest noise of a part, and the noisiest records."""
+    """Return the noise ratio of the noisiest and calmest parts, and the records of the noisiest."""
     size = len(blocks.spread) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None

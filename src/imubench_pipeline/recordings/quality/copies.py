@@ -41,7 +41,7 @@ _FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
 def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
-    """Yield a finding for each channel with the samples of another one, also in another unit."""
+    """Yield a finding for each channel with the samples of another one, in any unit."""
     pieces = {
         name: column.excerpts() for name, column in columns.items() if column.low < column.high
     }
@@ -127,7 +127,7 @@ def _describe_repeats(
 def find_copied_recordings(
     models: Iterable[ModelRow], biases: Iterable[FixedBiasRow]
 ) -> Iterator[FindingRow]:
-    """Yield findings about recordings that are copies of an earlier one, in their order."""
+    """Yield findings about recordings that are copies of an earlier one of their sensor."""
     means = {(row.sensor, row.recording, row.channel): row.value for row in biases}
     first: dict[tuple[Any, ...], str] = {}
     copies: dict[tuple[str, str], dict[str, list[str]]] = {}

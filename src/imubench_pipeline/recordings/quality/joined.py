@@ -114,7 +114,7 @@ def _is_lasting(logs: Array, place: int) -> bool:
 
 
 def detect_register_step(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
-    """Return the step of a register, SI, or infinity, and the finest detectable one, or None."""
+    """Return the register step (infinite if not seen) and the finest detectable, SI; or None."""
     whole = [piece for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
     values = [piece.present for piece in whole if len(piece.present) >= PIECE_SIZE // 8]
     if not values:
@@ -143,7 +143,7 @@ def _has_different_steps(
 
 
 def find_interleaved_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
-    """Yield a finding if every other sample seems to be of another sensor."""
+    """Yield a finding if every other sample seems to come from another sensor."""
     levels, noises, units, sizes = [], [], [], []
     pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE_SIZE // 4]
     for piece in pieces:

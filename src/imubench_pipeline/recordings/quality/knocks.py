@@ -24,7 +24,7 @@ _MARGIN_SAMPLES = 5  # samples on either side that are left out with a knock
 
 @dataclass(frozen=True)
 class Knock:
-    """One knock."""
+    """An isolated outlier with its surroundings, to be left out."""
 
     first: int
     last: int  # first and one-past-last record to leave out
@@ -34,11 +34,11 @@ class Knock:
 def find_outlier_blocks(
     blocks: BlockStatistics, sigmas: float, step: float | None = None
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the blocks with an outlier, and level and noise around them, SI, shape (n,) each.
+    """Return the indices of blocks with an outlier, level and noise around them, SI, shape (n,).
 
-    The level is the median of the means of the nearest blocks, the noise of the standard deviations
-    around, with a lower bound from the step. ``sigmas``: least distance of an outlier, in standard
-    deviations. ``step``: least significant bit, SI; None: not quantised.
+    The level is the median of the means of the nearest blocks. The noise is the median of the
+    standard deviations around, at least 2 steps over ``sigmas``. ``sigmas``: least distance of an
+    outlier, in standard deviations. ``step``: least significant bit, SI; None: not quantised.
     """
     least = _MIN_OUTLIER_STEPS * (step or 0.0) / sigmas
     filled = np.isfinite(blocks.spread)
@@ -131,9 +131,9 @@ _MAX_SHARE = 0.2  # Beyond it the log was interpolated to a higher rate, and not
 
 @dataclass(frozen=True)
 class StraightLines:
-    """What distinguishes interpolated samples: second differences, SI, below a tolerance."""
+    """Rule for interpolated samples: consecutive second differences up to a tolerance."""
 
-    tolerance: float
+    tolerance: float  # SI
     least: int  # consecutive samples
 
 
@@ -141,8 +141,8 @@ def detect_interpolation(pieces: Iterable[Excerpt], records: int) -> list[Straig
     """Return the rules that find interpolated samples; none in a log without any.
 
     Samples on a straight line have a second difference of 0, to the rounding of float64, or of the
-    digits of a file. By chance noise has such a run with a probability of p^n. ``records`` is the
-    number of records of the column.
+    digits of a file. By chance, n such differences follow each other in noise with probability p^n,
+    if one has p. ``records`` is the number of records of the column.
     """
     parts = [piece.values for piece in pieces if len(piece.values) > 2]
     second = np.concatenate([np.abs(np.diff(part, 2)) for part in parts]) if parts else np.empty(0)

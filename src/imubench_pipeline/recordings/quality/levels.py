@@ -181,7 +181,7 @@ def detect_quantisation(column: ColumnSummary) -> Quantisation | None:
 def find_piled_value(
     column: ColumnSummary, steps: Quantisation | None
 ) -> tuple[float, float] | None:
-    """Return a value, SI, far more frequent than its neighbours, and its share; None if none is.
+    """Return the value, SI, that is far more frequent than its neighbours, and its share; or None.
 
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
     samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
@@ -204,7 +204,7 @@ def find_piled_value(
 
 
 def is_truncated(column: ColumnSummary, step: float) -> bool:
-    """Return whether values were truncated towards 0, which makes its level twice as wide.
+    """Return whether values were truncated towards 0, so that level 0 is twice as wide.
 
     The logarithms of the counts of a rounded normal distribution are a parabola. Truncation adds
     ln 2 to the count at 0, and moves the other levels away by half a step.
@@ -299,7 +299,10 @@ def compute_longest_chance_run(column: ColumnSummary) -> float:
 def find_saturation(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
-    """Return the saturated extreme of a column and its samples, at least the ``share``; or None."""
+    """Return the saturated side, lowest or highest, and the number of samples there; or None.
+
+    ``share``: least share of the samples of a column at a saturated extreme.
+    """
     if steps is not None and steps.over_noise > _MAX_STEP_OF_SATURATION:
         return None  # with so few levels an extreme is frequent in any case
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):

@@ -58,7 +58,7 @@ class Stretch:
 
 
 class Repeats:
-    """Stored windows of a column, and the stretches that repeat."""
+    """Finds the stretches of a streamed column that repeat earlier ones (see the module)."""
 
     def __init__(self) -> None:
         words, numbers = np.zeros(3, dtype=np.uint64), np.zeros(6, dtype=np.int64)

@@ -49,7 +49,7 @@ def find_still_spans(
 
 
 def merge_spans(spans: Iterable[tuple[T, T]]) -> list[tuple[T, T]]:
-    """Return spans with those joined that touch or overlap."""
+    """Return the spans, sorted; spans that touch or overlap are joined."""
     merged: list[tuple[T, T]] = []
     for start, stop in sorted(spans):
         if merged and start <= merged[-1][1]:
@@ -64,8 +64,8 @@ def find_motion(
 ) -> list[tuple[int, int]]:
     """Return the parts (first, one past last record) in which the sensor was moved.
 
-    ``times``, ``least``: lower limits of the deviation, over its value at rest and in SI. A knock
-    is no motion.
+    ``times``: least ratio of the standard deviation to its value at rest. ``least``: least
+    standard deviation, SI. Knocks are no motion.
     """
     # The windows with the slow signals of a sensor in motion
     least_mean = _MIN_DEVIATION[quantity]

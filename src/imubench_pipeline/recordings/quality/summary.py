@@ -116,7 +116,7 @@ class Excerpt:
 
 @dataclass
 class Excerpts:
-    """Collects every piece of a column, every second, every fourth and so on, as it gets longer."""
+    """Collects evenly spaced pieces of a column; when too many, it drops every other one."""
 
     _stride: int = 1
     _reached: int = 0
@@ -236,7 +236,7 @@ class ColumnSummary:
 
     @property
     def at_extremes(self) -> tuple[int, int]:
-        """Samples at the lowest and at the highest value."""
+        """Numbers of samples at the lowest and at the highest value."""
         return int(self._state[_COUNT_AT_LOWEST]), int(self._state[_COUNT_AT_HIGHEST])
 
     @property
