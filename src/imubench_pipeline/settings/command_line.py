@@ -11,7 +11,7 @@ T = TypeVar("T", int, float)
 
 
 def parse_path(text: str) -> Path:
-    """Return a path that is not empty."""
+    """Return the path in an argument; argparse reports an empty one."""
     if not text or "\0" in text:
         raise argparse.ArgumentTypeError(f"found {text!r}; expected a path")
     return Path(text)
@@ -28,7 +28,7 @@ def add_units(parser: argparse.ArgumentParser) -> None:
 
 
 def parse_seconds(text: str) -> float:
-    """Return a time in s from a text with or without unit."""
+    """Return a time, s, from a text such as ``90`` or ``2 min``."""
     from imubench_pipeline.units import UnitError, parse_quantity
 
     try:
@@ -43,7 +43,7 @@ def parse_seconds(text: str) -> float:
 def make_number_type(
     least: float, most: float, words: str, read: Callable[[str], T]
 ) -> Callable[[str], T]:
-    """Return an argument type for a finite number in a range, ``words`` in the error."""
+    """Return an argument type for finite numbers in a range; ``words``: the range, for errors."""
 
     def value(text: str) -> T:
         try:
@@ -69,10 +69,10 @@ class CommandError(Exception):
 
 
 class Command(NamedTuple):
-    """A command.
+    """A command of ``imubench``.
 
     ``statuses``: meanings of its exit statuses, from 0; an empty text marks an unused status.
-    ``passes_on``: all arguments after ``--`` are for Snakemake.
+    ``passes_on``: whether arguments after ``--`` are passed on to Snakemake.
     """
 
     help: str

@@ -35,7 +35,7 @@ Folders = NamedPath | Annotated[tuple[NamedPath, ...], Field(min_length=1)]
 
 
 class AllanSettings(Strict):
-    """The grid of tau and the kernel."""
+    """Settings of the Allan variance: averaging times, and overlap of clusters."""
 
     overlap: Literal["full", "octave"] = Field(
         "octave",
@@ -76,7 +76,7 @@ class EstimateSettings(Strict):
     @classmethod
     def _once(cls, methods: tuple[Method, ...]) -> tuple[Method, ...]:
         if len(set(methods)) < len(methods):
-            raise ValueError(f"{', '.join(methods)}: a method stands twice")
+            raise ValueError(f"{', '.join(methods)}: a method occurs twice; expected each once")
         if methods == ("compensated",):
             raise ValueError("compensated requires another method, such as likelihood")
         return methods
@@ -92,7 +92,7 @@ class ReconstructionSettings(Strict):
 
 
 class DatasheetSettings(Strict):
-    """The comparison with printed figures."""
+    """Settings of the comparison with printed figures."""
 
     tolerance: float = Field(
         0.1, gt=0, description="relative difference that still counts as 'as printed'"
@@ -125,7 +125,7 @@ class DecideSettings(Strict):
 
 
 class CommonSettings(Strict):
-    """Common share of the variance of all units of one sensor, 0 to 1."""
+    """Share of the variance that all units of one sensor have in common, 0 to 1."""
 
     N: float = Field(0.0, ge=0, le=1, description="of the white noise, such as of a shared supply")
     B: float = Field(0.0, ge=0, le=1, description="of flicker noise and Gauss-Markov processes")
@@ -175,7 +175,7 @@ class LimitSettings(Strict):
 
 
 class SamplesSettings(Strict):
-    """The samples of recordings in SI, `log.parquet`, which only the analysis of a log needs."""
+    """Settings of the stored samples, `log.parquet`, which only the analysis of a log needs."""
 
     keep: Literal["all"] | Annotated[int, Field(ge=0)] = Field(
         "all",
@@ -185,7 +185,7 @@ class SamplesSettings(Strict):
 
 
 class TablesSettings(Strict):
-    """The joint tables of all sensors, which are always written as Parquet."""
+    """Settings of the joint tables of all sensors, which are always written as Parquet."""
 
     csv: Literal["all", "sensors", "none"] = Field(
         "all",
@@ -201,7 +201,7 @@ class TablesSettings(Strict):
 
 
 class ReportSettings(Strict):
-    """The report."""
+    """Settings of the report."""
 
     title: str = "Inertial sensor benchmark"
     units: Literal["practical", "si"] = Field(
@@ -265,7 +265,7 @@ class Run(WithBlocks):
 
     @property
     def to_simulate(self) -> Path | None:
-        """The list of simulated recordings; optional in a folder of logs."""
+        """Path of the list of simulated recordings; None if not used, or the default is missing."""
         by_default = (
             self.simulated == _SIMULATED_RECORDINGS_FILE and not _SIMULATED_RECORDINGS_FILE.exists()
         )
@@ -278,7 +278,7 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 
 
 def read_config(file: Path) -> JsonObject:
-    """Return the unchecked settings of a file, empty without one; ConfigError if it has no keys."""
+    """Return the unchecked settings in a file; empty without a file, ConfigError without keys."""
     content = read_yaml(file) if file.is_file() else None
     if content is not None and not isinstance(content, dict):
         raise ConfigError(f"{file}: found {cut(content)}, expected keys and values")
@@ -286,10 +286,10 @@ def read_config(file: Path) -> JsonObject:
 
 
 def given_beside(run: Run, file: Path) -> list[str]:
-    """Return the settings that a run got besides its file, in the form of ``snakemake --config``.
+    """Return the settings of a run that differ from ``file``, as for ``snakemake --config``.
 
-    Settings that do not affect the results of a recording are omitted. `file` is the configuration
-    that Snakemake reads by itself.
+    Settings that do not affect the results of a recording are omitted. ``file`` is the
+    configuration that Snakemake reads by default.
     """
     try:
         written = read_settings(Run, file)

@@ -31,7 +31,7 @@ class WithBlocks(Strict):
 
 
 def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
-    """Return a decorator that adds the blocks of extensions: defaults for a run, else null."""
+    """Return a decorator that adds the blocks of extensions: with defaults in a run, else None."""
 
     def extend(model: type[_Model]) -> type[_Model]:
         fields: dict[str, Any] = {}
@@ -57,11 +57,15 @@ class Experiment(Strict):
 
     @abstractmethod
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:
-        """Return the channel of the experiment, None for all; ValueError begins with the key."""
+        """Return the gyro of the experiment, or None for all channels.
+
+        ``channels``: of the log. ``column``: whether the log has a column with the rate of the
+        table. Raises ValueError, with the key, if the gyro or the rates are missing.
+        """
 
 
 class SimulatedSensors(Strict):
-    """A simulated recording of more than one static sensor."""
+    """Settings of a simulated recording that is made from several units of a sensor."""
 
     @abstractmethod
     def check(self, channels: "Mapping[Any, AxisSettings]") -> None:

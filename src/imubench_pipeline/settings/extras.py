@@ -14,7 +14,7 @@ class ExtraError(ImportError):
 
 @contextmanager
 def require_extra(name: Extra, purpose: str) -> Iterator[None]:
-    """Raise `ExtraError` if a package imported within, to do the ``purpose``, is missing."""
+    """Raise `ExtraError` if an import in the block fails; ``purpose``: such as ``draw``."""
     try:
         yield
     except ModuleNotFoundError as error:

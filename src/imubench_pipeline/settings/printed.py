@@ -45,7 +45,7 @@ def convert_power_density(density: float, sidedness: Sidedness) -> float:
     N = √S, or √(S/2) if it is one-sided (Engers, eq. 6, two-sided as printed).
     """
     if density < 0:
-        raise ValueError(f"a power density of {density:g}; expected 0 or more")
+        raise ValueError(f"the power density is {density:g}; expected 0 or more")
     return convert_density(math.sqrt(density), sidedness)
 
 
@@ -56,7 +56,7 @@ def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided
     frequency. It is rms / √bandwidth (Engers, eq. 8) if the bandwidth counts both (``two-sided``).
     """
     if bandwidth <= 0:
-        raise ValueError(f"a noise bandwidth of {bandwidth:g} Hz; expected one above 0")
+        raise ValueError(f"the noise bandwidth is {bandwidth:g} Hz; expected more than 0")
     return convert_density(rms / math.sqrt(bandwidth), sidedness)
 
 
@@ -64,7 +64,7 @@ def compute_noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float
     """Return the noise bandwidth of a low-pass filter by its -3 dB frequency, both in Hz.
 
     It is π/2 times the cut-off with one pole, π/(2√2) times with a Butterworth filter of second
-    order. ``stated``: it is the bandwidth itself, as Bosch, TDK and ST compute.
+    order. ``stated``: ``cut_off`` is the noise bandwidth itself, as Bosch, TDK and ST compute.
     """
     return cut_off * _NOISE_OVER_CUT_OFF[filter_]
 
@@ -166,7 +166,7 @@ class PrintedFigure(Strict):
         else:
             numbers = self.value.values() if isinstance(self.value, dict) else [self.value]
             if any(number <= 0 for number in numbers):
-                raise ValueError(f"value {self.value}; expected a figure above 0, ± left out")
+                raise ValueError(f"value {self.value}; expected a figure above 0, without ±")
         return self
 
     def on_axis(self, axis: str) -> float | tuple[float, ...] | None:
@@ -206,7 +206,7 @@ Figures = Annotated[
 
 
 class QuantityDatasheet(Strict):
-    """Figures of one quantity; null: not published."""
+    """Datasheet figures of the gyro or the accelerometer; null: not published."""
 
     noise_density: Figures = Field(None, description="density, .../sqrt(Hz), or squared, .../Hz")
     random_walk: Figures = Field(
@@ -259,12 +259,12 @@ class QuantityDatasheet(Strict):
         return {name: v for name, v in handler(self).items() if name in self.model_fields_set}
 
     def printed(self, name: str) -> tuple[PrintedFigure, ...]:
-        """Return the figures of a name that the vendor publishes."""
+        """Return the published figures of one kind, such as ``noise_density``."""
         figures: tuple[PrintedFigure, ...] = getattr(self, name) or ()
         return tuple(figure for figure in figures if figure.value is not None)
 
     def looked_up(self, name: str) -> bool:
-        """Return whether the file has a name, even if it is not published."""
+        """Return whether the sensor file has a figure ``name``, even as null (not published)."""
         return name in self.model_fields_set
 
 
@@ -304,7 +304,7 @@ def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> No
     """Raise for a wrong unit, and for values such as 400 g/√Hz, where µ was lost in a document."""
     dimensions = FIGURE_DIMENSIONS[quantity].get(name)
     if dimensions is None:
-        raise ValueError(f"{key}: found under {quantity}; expected under gyro alone")
+        raise ValueError(f"{key}: found under {quantity}; expected only under gyro")
     if figure.value is None or figure.unit is None:
         return
     unit = figure.unit
@@ -320,8 +320,8 @@ def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> No
                 and convert_to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE
             ):
                 raise ValueError(
-                    f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of "
-                    f"micro or milli lost? expected such as {value:g} u{unit.removeprefix('m')}"
+                    f"{key}: found {value:g} {unit}, which no accelerometer has; is a prefix such "
+                    f"as micro missing? expected such as {value:g} u{unit.removeprefix('m')}"
                 )
 
 

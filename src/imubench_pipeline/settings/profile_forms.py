@@ -21,14 +21,14 @@ _Time = Annotated[Text, make_validator("time")]
 
 
 class ConstantForm(Strict):
-    """One value."""
+    """A constant value."""
 
     form: Literal["constant"]
     value: Text
 
 
 class StepsForm(Strict):
-    """Values that are constant from their times on."""
+    """Constant values, each from its time to the next."""
 
     form: Literal["steps"]
     times: tuple[Text, ...] = Field(min_length=1)
@@ -38,7 +38,7 @@ class StepsForm(Strict):
     def _ordered(self) -> "StepsForm":
         if len(self.times) != len(self.values):
             raise ValueError(
-                f"{len(self.times)} times and {len(self.values)} values; expected as many"
+                f"{len(self.times)} times and {len(self.values)} values; expected equal numbers"
             )
         times = [parse_quantity(time, "time") for time in self.times]
         if times != sorted(set(times)):
@@ -121,7 +121,6 @@ class Surroundings(Strict):
 
 
 def _check_units(form: Form, dimension: str) -> None:
-    """Raise UnitError if a value of a formula has a unit of the wrong dimension."""
     match form:
         case ConstantForm():
             parse_quantity(form.value, dimension)

@@ -81,18 +81,18 @@ class Limit(Strict):
             raise ValueError("expected 'outage' and 'trajectory' together, such as 30 s and field")
         if self.outage is not None and self.error not in IN_OUTAGES:
             raise ValueError(
-                f"error is {self.error}; of an outage expected one of {', '.join(IN_OUTAGES)}"
+                f"error is {self.error}; expected one of {', '.join(IN_OUTAGES)} for an outage"
             )
         return self
 
     @property
     def seconds(self) -> float:
-        """The time in s."""
+        """Time after which the error is limited, or length of the outage, s."""
         return parse_quantity(self.outage or self.after or "", "time")
 
     @property
     def size(self) -> float:
-        """The largest error in SI."""
+        """Largest permitted error, SI."""
         return parse_quantity(self.at_most, DIMENSIONS[self.error])
 
     @property
@@ -212,9 +212,9 @@ class Requirement(Strict):
     @model_validator(mode="after")
     def _whole(self) -> Self:
         if self.static_window is not None and self.turn_on is not None:
-            raise ValueError("expected either 'static_window' or 'turn_on'")
+            raise ValueError("found both; expected either 'static_window' or 'turn_on'")
         if self.by_dead_reckoning and self.static_window is None and self.turn_on is None:
-            raise ValueError("expected either 'static_window' or 'turn_on'")
+            raise ValueError("found neither; expected either 'static_window' or 'turn_on'")
         if self.latitude is None and any(limit.error == "north" for limit in self.limits):
             raise ValueError("a limit of north needs 'latitude', such as 45 deg")
         if self.positions > 1 and self.positions % 2:
@@ -236,14 +236,14 @@ class Requirement(Strict):
 
     @property
     def quantities(self) -> tuple[Measured, ...]:
-        """Quantities that its errors come from."""
+        """Quantities, gyro and accel, that contribute to the limited errors."""
         turned = ("heading", "cross_track", "north")
         gyro_alone = all(limit.outage is None and limit.error in turned for limit in self.limits)
         return ("gyro",) if gyro_alone else ("gyro", "accel")
 
     @property
     def sigmas(self) -> float:
-        """Number of standard deviations of a limit, at its confidence."""
+        """Least ratio of a limit to the standard deviation of the error, from the confidence."""
         return NormalDist().inv_cdf((1.0 + self.confidence) / 2.0)
 
     def admits(self, price_class: str | None) -> bool:
@@ -254,12 +254,12 @@ class Requirement(Strict):
 
 
 def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requirement]:
-    """Read the requirements of folders by file name, none without a folder."""
+    """Return the requirements in folders by file name; empty if None. Raises `ConfigError`."""
     return (
         {} if folders is None else require_valid(read_folder(Requirement, folders, "requirement"))
     )
 
 
 def validate_requirements(sections: Mapping[str, object]) -> dict[str, Requirement]:
-    """Return the requirements from the text of a plan."""
+    """Return the requirements, by name, from their sections in a plan."""
     return {name: Requirement.model_validate(section) for name, section in sections.items()}

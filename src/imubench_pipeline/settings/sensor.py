@@ -110,11 +110,11 @@ class TimeSource(validation.Strict):
             if isinstance(column, int) and column < 1:
                 raise ValueError(f"column {column}: columns are counted from 1")
         if self.date is not None and self.format is None:
-            raise ValueError("'date' is given without 'format'; expected the format of both")
+            raise ValueError("'date' is given without 'format'; expected the format of both texts")
         if self.format is not None:
             _check_stamp_format(self.format)
             if self.wraps is not None or self.scale != 1:
-                raise ValueError("'wraps' and 'scale' are for numeric stamps; expected 'unit'")
+                raise ValueError("'wraps' and 'scale' need numeric stamps; drop 'format'")
         return self
 
 
@@ -135,7 +135,7 @@ def _check_stamp_format(form: str) -> None:
             "%d.%m.%Y %H:%M:%S.%f"
         )
     if repeated := [field for field in fields if field != "%" and fields.count(field) > 1]:
-        raise ValueError(f"format {form!r} has %{repeated[0]} twice")
+        raise ValueError(f"format {form!r} has %{repeated[0]} twice; expected each field once")
 
 
 Reader = Literal["csv", "vectornav", "ubx", "novatel", "ulog", "dataflash", "rosbag", "matlab",
@@ -193,7 +193,7 @@ class LogFormat(validation.Strict):
         if self.time is not None and self.time.unit == "samples" and self.rate is None:
             raise ValueError("'time' counts samples; expected 'rate' (such as 100 Hz) with it")
         if self.decimal is not None and self.decimal == self.delimiter:
-            raise ValueError(f"'delimiter' and 'decimal' are both {self.decimal!r}")
+            raise ValueError(f"'delimiter' and 'decimal' are both {self.decimal!r}; change one")
         for channel, source in self.channels.items():
             _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
         if self.temperature is not None:
@@ -316,7 +316,7 @@ class RecordingNotes(experiments.WithBlocks):
         return experiments.kind_of(experiments.stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
-        """Raise ValueError, with the key, if the log lacks the gyro or a need of an experiment."""
+        """Raise ValueError, with the key, if ``log`` lacks the gyro or rates of an experiment."""
         channels = [str(name) for name in log.channels]
         for key, experiment in experiments.stated_experiments(self).items():
             try:
@@ -331,7 +331,10 @@ def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
 
 
 def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | validation.ConfigError]:
-    """Read every sensor file of folders; return the errors of invalid ones, or ConfigError."""
+    """Return the sensors in folders by file name; the `ConfigError` of an invalid file, instead.
+
+    Raises `ConfigError` if a folder is missing.
+    """
     return read_folder(Sensor, folders, "sensor")
 
 
@@ -343,7 +346,7 @@ def shipped_sensors() -> Mapping[str, Sensor]:
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:
-    """Return the sensors from the text that the plan wrote."""
+    """Return the sensors, by name, from the JSON text in a plan."""
     return {name: Sensor.model_validate(section) for name, section in json.loads(catalogue).items()}
 
 
@@ -354,7 +357,7 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
 
 
 class IngestPlan(validation.Strict):
-    """Settings of the ingest of a recording; without ``log``, the reason why it cannot be read."""
+    """Settings of the ingest of a recording; if ``log`` is None, ``error`` is the reason."""
 
     kind: experiments.Kind = experiments.AT_REST
     simulated: bool = False

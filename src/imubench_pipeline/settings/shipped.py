@@ -20,7 +20,7 @@ def find_project() -> Path:
 
 
 def list_folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
-    """Return the folders of a configuration, each once, later ones with precedence."""
+    """Return the folders of sensor or requirement files, each once; later ones have precedence."""
     found: dict[Path, Path] = {}
     for folder in [stated] if isinstance(stated, Path) else stated:
         place = find_project() / "config" / kind if folder == CATALOGUE else folder

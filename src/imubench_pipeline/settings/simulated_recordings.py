@@ -60,7 +60,7 @@ class PublishedFigure(Strict):
     why: Text | None = Field(None, description="reason for the difference from an estimate")
 
     def si(self, quantity: str) -> float:
-        """Return its meaning in SI."""
+        """Return the figure ``means`` in SI."""
         dimensions = {
             "N": f"{quantity}_density",
             "sensitivity": f"{quantity}_temperature_coefficient",
@@ -128,13 +128,15 @@ class OfASensor(ImuSettings):
         length = parse_quantity(self.duration, "time") * parse_quantity(self.rate, "frequency")
         if not 0.5 < length <= _MAX_SAMPLES:
             content = "no sample" if length < 1.0 else f"more than {_MAX_SAMPLES:g} samples"
-            raise ValueError(f"duration: {self.duration} at {self.rate} hold {content}")
+            raise ValueError(
+                f"duration: {self.duration} at {self.rate} gives {content}; mend one of them"
+            )
         check_axes(self.channels, "channels")
         return self
 
     @property
     def samples(self) -> int:
-        """Length of the log."""
+        """Number of samples of the log."""
         rate = parse_quantity(self.rate, "frequency")
         return round(parse_quantity(self.duration, "time") * rate)
 
@@ -170,7 +172,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def simulated_sensors(self) -> dict[str, SimulatedSensors]:
-        """The special simulation, by its key: one at most."""
+        """Settings for a recording of several units, by key; one at most."""
         return {key: value for key, value in self if isinstance(value, SimulatedSensors)}
 
     @property
@@ -220,7 +222,7 @@ class Board(Surroundings):
         return self
 
     def recordings(self, name: str) -> Iterator[SimulatedRecording]:
-        """Yield the recording of each sensor of the board of this name."""
+        """Yield the recording ``sim_<name>`` of each sensor of the board."""
         around = {key: getattr(self, key) for key in Surroundings.model_fields}
         for sensor in self.sensors:
             own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
@@ -256,18 +258,18 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError
         place = path.parent / file
         if not place.is_file():
             raise ConfigError(
-                f"{path}: boards: {place}: no such file; expected the file of a board, named from "
-                "the folder of the file that names it"
+                f"{path}: boards: {place}: no such file; expected the file of a board, relative to "
+                f"{path.parent}"
             )
         board = read_settings(Board, place)
         for number, sensor in enumerate(board.sensors):
             _check(sensor, sensors, f"{place}: sensors.{number}")
         names = [sensor.sensor for sensor in board.sensors]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ConfigError(f"{place}: sensors: {twice} stands twice; expected each once")
+            raise ConfigError(f"{place}: sensors: {twice} occurs twice; expected each once")
         board = _found_from(board, place)
         if file.stem in boards:
-            raise ConfigError(f"{path}: boards: two are named {file.stem}; expected other names")
+            raise ConfigError(f"{path}: boards: two are named {file.stem}; rename one of the files")
         if not re.match(_NAME_PATTERN, f"sim_{file.stem}"):
             raise ConfigError(
                 f"{path}: boards: found {str(file)!r}; expected a name of letters, digits and . _ -"
@@ -292,8 +294,8 @@ def _check(entry: OfASensor, sensors: Mapping[str, Sensor | ConfigError], key: s
     unknown = set(entry.channels) - set(sensor.log.channels)
     if unknown:
         raise ConfigError(
-            f"{key}.channels: {', '.join(sorted(unknown))} not channels "
-            f"of {entry.sensor}: {', '.join(sensor.log.channels)}"
+            f"{key}.channels: found {', '.join(sorted(unknown))}; expected channels of the sensor "
+            f"file {entry.sensor}: {', '.join(sensor.log.channels)}"
         )
 
 
@@ -307,7 +309,7 @@ def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
         if not file.is_file():
             raise ConfigError(
                 f"{path}: {key}{name}.file: {file}: no such file; expected a CSV or Parquet file, "
-                "named from the folder of the file that names it"
+                f"relative to {path.parent}"
             )
         return form.model_copy(update={"file": file})
 
@@ -317,7 +319,7 @@ def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
 
 
 def profile_files(recording: SimulatedRecording) -> list[Path]:
-    """Return the files of its temperature and motion profiles."""
+    """Return the files with the temperature and motion profiles of a recording."""
     forms = (recording.temperature, *recording.motion.values())
     return sorted({form.file for form in forms if isinstance(form, FileForm)})
 

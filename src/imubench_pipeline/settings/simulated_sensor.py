@@ -71,7 +71,7 @@ class DriftSettings(_Figures):
 
 
 class LowPassSettings(Strict):
-    """The low-pass."""
+    """A low-pass filter; first order by default."""
 
     cutoff: Frequency
     order: int = Field(1, ge=1, le=10, description="above 1: Butterworth")
@@ -109,7 +109,7 @@ class AxisSettings(_Figures):
     @model_validator(mode="after")
     def _of_a_process(self) -> Self:
         if self.T_B is not None and self.B is None:
-            raise ValueError("T_B is the correlation time of B, which is missing")
+            raise ValueError("T_B is the correlation time of B, which is missing; state B")
         return self
 
     def check(self, channel: str) -> None:

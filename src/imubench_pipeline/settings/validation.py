@@ -50,7 +50,7 @@ _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_
 def cut(
     value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
 ) -> str:
-    """Return a value of a file for messages, by `repr` or ``words``, cut to ``most`` characters."""
+    """Return a value as text for messages, by ``words``, cut to ``most`` characters."""
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -65,8 +65,8 @@ def make_validator(
 ) -> AfterValidator:
     """Return a validator for a number with a unit of a dimension, and its range.
 
-    ``expected`` is the expected value in the error for a number that is not above 0 (``from_zero``:
-    not negative) or ``within`` limits in SI; by default all are valid. ``to_si`` converts a text.
+    ``expected``: the valid numbers, for errors: above 0 (``from_zero``: 0 and above), and
+    ``within`` two limits in SI. None: any number. ``to_si`` converts text and dimension.
     """
 
     def check(text: str) -> str:
@@ -111,9 +111,9 @@ _INVISIBLE_CHARACTERS = re.compile(
 
 def _check_visible(text: str) -> str:
     if len(text) > _MAX_TEXT_LENGTH:
-        raise ValueError(f"{len(text)} letters; expected at most {_MAX_TEXT_LENGTH}")
+        raise ValueError(f"has {len(text)} characters; expected at most {_MAX_TEXT_LENGTH}")
     if unseen := _INVISIBLE_CHARACTERS.search(text):
-        raise ValueError(f"holds U+{ord(unseen[0]):04X}; expected what can be seen")
+        raise ValueError(f"holds the invisible character U+{ord(unseen[0]):04X}; remove it")
     return text
 
 

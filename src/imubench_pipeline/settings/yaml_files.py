@@ -81,7 +81,7 @@ class _Loader(_SAFE):
             key = self.construct_object(key_node, deep=True)
             if isinstance(key, Hashable):
                 if key in seen:
-                    raise _make_fault(key_node, f"the key {cut(key)} stands twice; remove one")
+                    raise _make_fault(key_node, f"the key {cut(key)} occurs twice; remove one")
                 seen.add(key)
         return super().construct_mapping(node, deep=deep)
 
@@ -90,7 +90,8 @@ class _Loader(_SAFE):
         if figure and len(node.value) > MAX_NUMBER_LENGTH:
             kind = cut(node.tag.rpartition(":")[2], str)
             raise _make_fault(
-                node, f"{len(node.value)} letters are no {kind}; expected a shorter one"
+                node,
+                f"{kind} of {len(node.value)} characters; expected at most {MAX_NUMBER_LENGTH}",
             )
         try:
             return super().construct_object(node, deep=deep)
@@ -138,14 +139,14 @@ def read_yaml(path: Path) -> object:
         for event in yaml.parse(text, Loader=_SAFE):
             if isinstance(event, yaml.AliasEvent):
                 if event.anchor in (anchor for anchor, _ in open_nodes):
-                    raise _make_fault(event, f"*{cut(event.anchor, str)} holds itself")
+                    raise _make_fault(event, f"*{cut(event.anchor, str)} contains itself")
                 nodes += sizes.get(event.anchor or "", 1)
             elif isinstance(event, yaml.CollectionStartEvent):
                 open_nodes.append((event.anchor, nodes))
                 nodes += 1
                 if len(open_nodes) > MAX_DEPTH:
                     raise _make_fault(
-                        event, f"more than {MAX_DEPTH} lists and mappings in each other"
+                        event, f"found more than {MAX_DEPTH} nested lists and mappings"
                     )
             elif isinstance(event, yaml.CollectionEndEvent):
                 anchor, before = open_nodes.pop()
@@ -156,12 +157,12 @@ def read_yaml(path: Path) -> object:
                 if event.anchor is not None:
                     sizes[event.anchor] = 1
             if nodes > MAX_NODES:
-                raise _make_fault(event, f"more than {MAX_NODES} keys and values, aliases counted")
+                raise _make_fault(event, f"found more than {MAX_NODES} keys and values")
         return yaml.load(text, Loader=_Loader)
     except ConfigError:
         raise
     except FileNotFoundError:
-        reason = f"{path}: no such file; expected one of YAML: mend its name"
+        reason = f"{path}: no such file; expected a YAML file: check its name"
         raise UnavailableSettingsError(reason) from None
     except OSError as error:
         raise UnavailableSettingsError(f"{path}: cannot be read ({error.strerror})") from None
@@ -183,7 +184,8 @@ def read_folder(
 ) -> dict[str, _Model | ConfigError]:
     """Return all ``.yaml`` files of folders as models by name, with errors for invalid ones.
 
-    A later folder has precedence; a missing one raises a `ConfigError`.
+    A later folder has precedence; a missing one raises a `ConfigError`. ``each``: what a file
+    describes, such as ``sensor``, for errors.
     """
     models: dict[str, _Model | ConfigError] = {}
     for name, path in list_files(folders, each).items():
@@ -199,7 +201,7 @@ def list_files(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
     files: dict[str, Path] = {}
     for folder in [folders] if isinstance(folders, Path) else folders:
         if not folder.is_dir():
-            raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
+            raise ConfigError(f"{folder}: no such folder; expected a YAML file for each {each}")
         files |= {path.stem: path for path in folder.glob("*.yaml")}
     return dict(sorted(files.items(), key=lambda file: file[1].name))
 
@@ -219,7 +221,7 @@ def _read_text(path: Path) -> str:
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise ConfigError(f"{path}: no regular file; expected one of YAML")
+        raise ConfigError(f"{path}: is not a regular file; expected a YAML file")
     with os.fdopen(descriptor, "rb") as file:
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
