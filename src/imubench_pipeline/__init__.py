@@ -1,7 +1,7 @@
 """Benchmark of inertial sensors: from static logs to a cross-IMU report.
 
-The front door
---------------
+Functions
+---------
 ``import imubench_pipeline as imu`` gives
 
 ===========================  ======================================================================
@@ -45,16 +45,16 @@ Types
 ones are NaN. A row of a table has a class in `model`, with a field for each column. A log that is
 longer than memory goes as an iterator of blocks, arrays of consecutive samples.
 
-Rooms
------
-From the lowest: `units`, `earth` and `typing`; `model` (the rows of every table); `settings` (what
-users declare), `allan` (the Allan
-variance), `tables` (columns, reading, writing), `noise` (what each noise is), `readers` (log
-files), `recordings` (logs, judged and kept), `estimators` (parameters), `datasheets`, `simulate` (a
-whole sensor), `navigation` (what noise means in use), `report`, `steps` (one module a rule of the
-workflow), `library` (the front door), `run` (plan, processes, commands) and `extensions`, such as
-`extensions.exports` (files for filters). Only `report`, `steps` and `run` know the
-files and the settings of a run together. ``docs/architecture.md`` lists the permitted imports.
+Packages
+--------
+From the lowest layer: `units`, `earth` and `typing`; `model` (the rows of every table); `settings`
+(declarations of users), `allan` (the Allan variance), `tables` (columns, reading, writing), `noise`
+(noise terms), `readers` (log files), `recordings` (logs, checked and stored), `estimators`
+(parameters), `datasheets`, `simulate` (a whole sensor), `navigation` (errors in use), `report`,
+`steps` (one module for each rule of the workflow), `library` (these functions), `run` (plan,
+processes, commands) and `extensions`, such as `extensions.exports` (files for filters). Only
+`report`, `steps` and `run` know both the files and the settings of a run. ``docs/architecture.md``
+lists the permitted imports.
 
 References
 ----------

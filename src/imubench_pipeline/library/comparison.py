@@ -39,7 +39,7 @@ class Compared:
 
     @property
     def verdict(self) -> str:
-        """Name of the log with the lower value, or the verdict of no significant difference."""
+        """Which log has the lower value, as ``quiet lower``; else the verdict of the ratio."""
         lower = {"lower": self.names[0], "higher": self.names[1]}.get(self.ratio.verdict)
         return f"{lower} lower" if lower else self.ratio.verdict
 
@@ -173,12 +173,12 @@ def compare(
     'quiet lower'
     """
     if len(logs) < 2:
-        raise ValueError(f"{len(logs)} given; expected two or more logs, or estimates")
+        raise ValueError(f"{len(logs)} given; expected two or more logs or estimates")
     estimates = []
     for log in logs:
         if not isinstance(log, Log | Estimates):
             raise ValueError(
-                f"found {type(log).__name__}; expected what read_log or estimate returns"
+                f"found {type(log).__name__}; expected a result of read_log or estimate"
             )
         estimates.append(estimate(log, method=method) if isinstance(log, Log) else log)
     called = list(names or ())
@@ -207,8 +207,8 @@ def _pair(
     channels = [channel for channel in first if channel in second]
     if not channels:
         raise ValueError(
-            f"{names[0]} has {', '.join(first)}, {names[1]} {', '.join(second)}; expected one "
-            "channel or more that both have"
+            f"{names[0]} has {', '.join(first)}, {names[1]} has {', '.join(second)}; expected at "
+            "least one common channel"
         )
     for channel in channels:
         pair = first[channel], second[channel]
@@ -234,7 +234,6 @@ def _pair(
 
 
 def _make_fusion_channel(estimate: ChannelEstimate) -> ratios.ComparedChannel:
-    """Return a channel in the form of `extensions.fusion`."""
     curve = estimate.measured
     assert curve is not None
     sensor, _, recording = estimate.log.partition("/")

@@ -201,7 +201,8 @@ def allan_variance(
     if isinstance(data, Log):
         if rate is not None or units is not None or valid is not None or segments is not None:
             raise ValueError(
-                "a log has its own rate, units, missing samples and segments; expected none of them"
+                "a Log has its own rate, units, missing samples and segments; omit rate=, units=, "
+                "valid= and segments="
             )
         chosen = data.chosen(channels)
         curves = [measured(log, cluster_sizes, overlap, cores) for log in chosen.values()]

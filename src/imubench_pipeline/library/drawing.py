@@ -31,7 +31,7 @@ def create_panels(names: Sequence[str], ax: "Axes | Sequence[Axes] | None" = Non
     if ax is not None:
         given = np.atleast_1d(np.asarray(ax)).ravel()
         if len(given) != count:
-            raise ValueError(f"{len(given)} axes; expected one for each of {', '.join(names)}")
+            raise ValueError(f"ax= has {len(given)} axes; expected one each for {', '.join(names)}")
         return given
     with require_extra("workflow", "draw"):
         from matplotlib import pyplot as plt

@@ -144,7 +144,7 @@ class Estimates(ByChannel[ChannelEstimate]):
         """
         if len(self) != 1:
             raise ValueError(
-                f"there are models of {', '.join(self)}; expected .models, or [channel]"
+                f"there are several models ({', '.join(self)}); use .models or [channel].model"
             )
         return next(iter(self.values())).model
 
@@ -203,7 +203,7 @@ class Estimates(ByChannel[ChannelEstimate]):
         Raises
         ------
         ValueError
-            If the program is not known or cannot hold the noise, or the log is unfit.
+            If the program is not known or cannot represent the noise, or the log is unfit.
         """
         options = {
             "axis": axis,
@@ -253,7 +253,7 @@ def estimate(
     method : str
         ``robust`` (the Allan variance, with limits that hold for sensors that change), or another
         of the workflow: ``likelihood`` (spectrum), ``likelihood_gm`` (the papers' N, B, T_B, K),
-        ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
+        ``compensated`` (without the temperature effect), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
         For an array, the channels of the columns; for a log or table, the selected channels.
     units : mapping of str to str, optional
@@ -289,13 +289,13 @@ def estimate(
         raise ValueError(f"method is {method!r}, expected one of {', '.join(get_args(Method))}")
     if isinstance(data, Log):
         if rate is not None or units is not None:
-            raise ValueError("a log has its own rate and units; expected none of them beside it")
+            raise ValueError("a Log has its own rate and units; omit rate= and units=")
         log = data
     else:
         log = ingest_columns(read_columns(data, channels, units), read_rate(rate, data), name)
     chosen = log.chosen(channels if log is data else None)
     if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
-        raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
+        raise ValueError(f"{log.name} has no temperature, as {method} needs; use another method")
     # The doubts about a curve come from the likelihood: this method always runs.
     asked = tuple(dict.fromkeys(("likelihood", method)))
     how = parse(EstimateSettings, {**settings, "methods": asked}, "estimate")
@@ -347,7 +347,6 @@ def _usual_of_catalogue() -> UsualFigures:
 
 
 def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
-    """Yield the rows of the summary of an estimate, in engineers' units."""
     order = {symbol: place for place, symbol in enumerate(SHOWN)}
     components = [
         (component, symbol, parameter)
@@ -368,7 +367,6 @@ def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
 
 
 def _list_reasons(estimates: Any) -> list[str]:
-    """Return the reasons of doubtful values, and remarks on N."""
     reasons = (
         f"{estimate.channel} {symbol_text(symbol)}: {cut(parameter.reason, 150)}"
         for estimate in estimates

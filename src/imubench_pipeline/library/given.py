@@ -73,11 +73,11 @@ def convert_to_numbers(values: object, name: str) -> Array:
     try:
         array = np.asarray(filled)
         if array.dtype.kind not in "fiu" and not (array.dtype.kind == "O" and array.size):
-            raise ValueError(f"{name} is of {array.dtype}")
+            raise ValueError(f"its dtype is {array.dtype}")
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError(
-            f"{name} is no array of numbers ({error}); expected one such as numpy.loadtxt gives"
+            f"{name} is no array of numbers ({error}); expected one such as numpy.loadtxt returns"
         ) from None
 
 
@@ -104,7 +104,7 @@ def read_columns(
     if units is not None and not isinstance(units, Mapping):
         raise ValueError(f"units are {units!r}; expected such as {{'gyro': 'deg/s', 'accel': 'g'}}")
     if unknown := [key for key in units or () if key not in known]:
-        raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
+        raise ValueError(f"units= has the key {unknown[0]!r}; expected one of {', '.join(known)}")
     is_table = _is_table(data)
     if has_columns(data):
         columns = dict(
@@ -126,8 +126,8 @@ def check_present(values: Array, name: str) -> None:
         raise ValueError(f"{name} is empty; expected two samples or more")
     if not np.isfinite(values).any():
         raise ValueError(
-            f"{name}: none of the {len(values)} samples is a finite number; expected a channel "
-            "that was recorded: leave it out, or look into what made the array"
+            f"{name}: none of the {len(values)} samples is a finite number; expected a recorded "
+            "channel: leave it out, or check how the array was made"
         )
 
 
@@ -157,8 +157,8 @@ def expand_channels(channels: Channels | None) -> list[str] | None:
     names = [name for each in map(str, asked) for name in _CHANNELS_OF_QUANTITY.get(each, [each])]
     if unknown := [name for name in names if name not in (*CHANNELS, TEMPERATURE)]:
         raise ValueError(
-            f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}, or gyro or accel for "
-            "three axes"
+            f"no channel {unknown[0]!r}; expected one of {', '.join(CHANNELS)}, or gyro or accel "
+            "for three axes"
         )
     if len(set(names)) < len(names):
         raise ValueError(f"channels are {', '.join(names)}; expected each of them once")
@@ -172,7 +172,6 @@ def _find_unit(name: str, units: Units) -> str | None:
 def _name_columns(
     data: object, names: list[str] | None, units: Units
 ) -> Iterator[tuple[str, Column]]:
-    """Yield the columns of an array with their channel names."""
     array = convert_to_numbers(data, "the array")
     if array.ndim not in (1, 2) or not array.size:
         raise ValueError(
@@ -208,7 +207,9 @@ def _select_columns(
     written = {label: _split_label(label) for label in (data.columns if stated else data)}
     there = {name: label for label, (name, _) in written.items()}
     if len(there) < len(written):
-        raise ValueError(f"two columns of {', '.join(map(str, written))} are one channel")
+        raise ValueError(
+            f"two of the columns {', '.join(map(str, written))} are the same channel; rename one"
+        )
     passed = (TEMPERATURE, *_TIME_COLUMNS)
     if names is None:
         strange = [label for label, (name, _) in written.items() if name not in CHANNELS]
@@ -216,8 +217,8 @@ def _select_columns(
         if strange or not set(there) & set(CHANNELS):
             raise ValueError(
                 f"found {f'the column {strange[0]!r}' if strange else 'no channel'}; expected "
-                f"columns of {', '.join(CHANNELS)}, such as 'gyro_x [deg/s]': rename them, or name "
-                "those to take with channels="
+                f"columns of {', '.join(CHANNELS)}, such as 'gyro_x [deg/s]'; rename the columns, "
+                "or select channels with channels=[...]"
             )
         names = [name for name in (*CHANNELS, TEMPERATURE) if name in there]
     lengths = set()
@@ -244,13 +245,13 @@ def _select_columns(
         unit = next(filter(None, sources.values()), None)
         if unit is None and stated:
             raise UnitError(
-                f"{name}: the table does not say its unit, which is never guessed; expected such "
-                f"as units={{'gyro': 'deg/s', 'accel': 'm/s^2'}}, or columns such as '{name} "
-                f"[{SI_UNITS[get_dimension(name)]}]'"
+                f"{name}: the table does not state its unit, which is never guessed; state it, as "
+                "in units={'gyro': 'deg/s', 'accel': 'm/s^2'}, or rename the column, as in "
+                f"'{name} [{SI_UNITS[get_dimension(name)]}]'"
             )
         yield name, Column(values, unit or SI_UNITS[get_dimension(name)])
     if len(lengths) > 1:
-        raise ValueError(f"the channels have {sorted(lengths)} samples; expected as many of each")
+        raise ValueError(f"the channels have {sorted(lengths)} samples; expected equal numbers")
 
 
 def _split_label(label: object) -> tuple[str, str | None]:

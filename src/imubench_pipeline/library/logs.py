@@ -58,7 +58,7 @@ class Log:
     sensor, recording : str
         Names. The random streams of an estimate depend on them, as in the workflow.
     name : str
-        Both of them.
+        Sensor and recording, joined by ``/``.
     simulated : bool
         Whether the log is simulated, by its own mark or the notes beside it.
     channels : tuple of str
@@ -108,7 +108,7 @@ class Log:
         """
         if len(set(self.rates.values())) > 1:
             each = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in self.rates.items())
-            raise ValueError(f"the channels have rates of their own ({each}); expected .rates")
+            raise ValueError(f"the channels have different rates ({each}); use .rates")
         return next(iter(self.rates.values()))
 
     @property
@@ -140,7 +140,7 @@ class Log:
         return len(self.channels)
 
     def chosen(self, channels: Channels | None = None) -> dict[str, recording.ChannelLog]:
-        """Return channels, by default all, in the form of the steps of the workflow.
+        """Return the selected channels, by default all, as the stored logs that steps analyse.
 
         Raises
         ------
@@ -150,12 +150,12 @@ class Log:
         if not self._at_rest:
             raise ValueError(
                 f"{self.name}: the notes beside the log say that the sensor was turned "
-                f"({self._about.kind}); expected a log at rest: noise is told from that alone"
+                f"({self._about.kind}); expected a log at rest, since motion is not noise"
             )
         names = expand_channels(channels) or self.channels
         if missing := [name for name in names if name not in self._logs]:
             raise ValueError(
-                f"{self.name} has no {missing[0]}; expected of {', '.join(self.channels)}"
+                f"{self.name} has no {missing[0]}; expected one of {', '.join(self.channels)}"
             )
         return {name: self._logs[name] for name in names}
 
@@ -172,7 +172,7 @@ class Log:
         import pandas as pd
 
         if len({(log.grid, log.rate) for log in self._logs.values()}) > 1:
-            raise ValueError("the channels have clocks of their own; expected log[channel] of each")
+            raise ValueError("the channels have different clocks; use log[channel] for each")
         columns = {f"{name} [{SI_UNITS[get_dimension(name)]}]": self[name] for name in self._names}
         length = len(next(iter(columns.values())))
         table = pd.DataFrame(
@@ -273,7 +273,7 @@ def read_log(
 
 
 def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples at a rate, Hz, as a log; raises RecordingError if no channel can be used."""
+    """Return a log of samples at ``rate``, Hz; raises RecordingError if no channel can be used."""
     if not name or Path(name).name != name:
         raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")
     channels, temperature = {}, None
@@ -301,7 +301,6 @@ def _ingest(
     *,
     guarded: bool,
 ) -> tuple[Path, Quality]:
-    """Ingest a log; return the folder of its samples, and its quality."""
     limits = parse(QualitySettings, quality, "quality")
     settings = IngestPlan(kind=notes.kind, notes=notes, log=log, quality=limits).to_json()
     folder = Path(tempfile.mkdtemp(prefix="imubench."))
@@ -324,7 +323,7 @@ def _load_sensor(
         return _draft_sensor(source, rate, units), of_folder, None
     if rate is not None or units is not None:
         raise ValueError(
-            "rate= and units= fill in a draft; expected them in what sensor= states, or no sensor="
+            "rate= and units= complete a drafted sensor file; omit them, or omit sensor="
         )
     if isinstance(sensor, Sensor):
         return sensor, of_folder, None
@@ -347,7 +346,6 @@ def _load_sensor(
 
 
 def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -> Sensor:
-    """Return a sensor file drafted from a log, completed by the rate and units of the user."""
     inspection = inspect(source)
     stated = units or {}
     draft = inspection.draft.with_units(
@@ -356,11 +354,11 @@ def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -
     if rate is not None:
         draft.rate = Entry(f"{parse_setting(rate, 'frequency', 'rate')!r} Hz")
     if unknown := [key for key in units or () if key not in (*CHANNELS, "gyro", "accel")]:
-        raise ValueError(f"units name {unknown[0]!r}; expected gyro, accel, or a channel")
+        raise ValueError(f"units= has the key {unknown[0]!r}; expected gyro, accel, or a channel")
     if left := draft.unfilled():
         raise ValueError(
-            f"{source.name}: the log does not say {', '.join(left)}; expected units= or rate= that "
-            "do, such as units={'gyro': 'deg/s'}, or sensor= with this, where ? is filled in:\n\n"
+            f"{source.name}: the log does not state {', '.join(left)}; state it with units= or "
+            "rate=, as units={'gyro': 'deg/s'}, or pass this as sensor=, with each ? filled in:\n\n"
             f"{inspection.block}"
         )
     return parse(Sensor, draft.sensor(), f"the sensor file drafted from {source.name}")

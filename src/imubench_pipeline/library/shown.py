@@ -27,7 +27,7 @@ def summarise(
 
 
 class ByChannel(Mapping[str, V]):
-    """Results by channel."""
+    """Mapping from channels to their results."""
 
     _by_channel: Mapping[str, V]
 
