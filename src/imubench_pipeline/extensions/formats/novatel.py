@@ -53,7 +53,7 @@ class Scale:
     is_rate: bool = False
 
     def per_count(self, quantity: str, rate: float) -> float:
-        """Return rad/s or m/s² per count of a log of this rate, Hz."""
+        """Return rad/s or m/s² per count in a log with the sampling ``rate``, Hz."""
         factor = self.gyro if quantity == "gyro" else self.accel
         return factor if self.is_rate else factor * rate
 
@@ -181,10 +181,7 @@ def list_logs(path: Path, file_format: formats.FileFormat) -> list[formats.LogTa
 def _add_scale(
     column: formats.LogColumn, imu: str, rate: float | None, gravity: float
 ) -> formats.LogColumn:
-    """Return a column with the scale of the type of IMU, or else with the likely ones as a hint.
-
-    ``gravity``: length of the mean acceleration in counts.
-    """
+    """Return a column with the scale of its IMU, or a hint; ``gravity``: its length in counts."""
     quantity = column.label[:-2]
     unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
     if rate is None:

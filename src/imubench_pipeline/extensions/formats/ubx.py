@@ -123,7 +123,6 @@ class UbxFile(LogFile):
             )
 
     def _kind(self) -> bytes:
-        """Return class and id of the message with the columns."""
         stated = {source.variable for source in self.sources.values()} - {None}
         kinds = [key for key, name in KINDS.items() if name in stated]
         if len(stated) > 1 or len(kinds) != len(stated):
@@ -146,7 +145,7 @@ class UbxFile(LogFile):
             return present[0]
         if present:
             raise RecordingError(
-                f"{self.path.name}: both ESF-MEAS and ESF-RAW hold the columns; say which with "
+                f"{self.path.name}: both ESF-MEAS and ESF-RAW have the columns; select one with "
                 "'variable: ESF-RAW' (every sample) or 'variable: ESF-MEAS' at each column"
             )
         types = ", ".join(
@@ -163,7 +162,6 @@ class UbxFile(LogFile):
         )
 
     def _is_clear(self, frames: Frames, words: "dict[bytes, Words]") -> bool:
-        """Return whether the log read so far is enough to choose the message."""
         for of_kind in words.values():
             of_kind.drained()
         present = any(of_kind.present for of_kind in words.values())
@@ -198,7 +196,7 @@ def _describe_types(columns: list[str]) -> str:
 
 
 class Words:
-    """Buffer of the measurements that are not yet in a batch; ``seen``: number by data type."""
+    """Buffer of measurements for the next batch; ``seen``: their number so far, by data type."""
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
         self._raw = kind == ESF_RAW
@@ -242,7 +240,7 @@ class Words:
     def drained(
         self,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        """Remove and return column, value, tag and index of the required measurements."""
+        """Remove and return column, value, tag and index of the required measurements, (n,)."""
         written = np.frombuffer(b"".join(self._parts), "<u4")
         if self._raw:
             words, tags = written[::2], written[1::2]

@@ -29,7 +29,7 @@ class Frames:
         self.read = 0
 
     def kinds(self) -> str:
-        """Describe the most frequent class and id of messages."""
+        """Return the class and id of the most frequent messages, with their numbers, as text."""
         most = self.right.most_common(10)
         return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
 

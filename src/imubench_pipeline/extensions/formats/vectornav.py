@@ -92,7 +92,7 @@ class Counts:
         self.others: Counter[str] = Counter()
 
     def report(self, file: LogFile, kind: str, width: int) -> None:
-        """Note in the findings of a log what is no sentence of a kind and width."""
+        """Add findings about text of a log that is no valid ``kind`` with ``width`` fields."""
         name, timed = file.path.name, file.log.time is not None
         if count := self.wrong:
             wrong = files.WrongChecksum(name, count, kind, is_sentence=True, is_left_out=timed)
@@ -170,7 +170,7 @@ def find_position(kind: str, column: str | int) -> int:
 
 
 def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
-    """Yield the text of a log in blocks of complete lines; a last one that is cut is reported."""
+    """Yield the text of a log in blocks of complete lines; an incomplete last line is reported."""
     rest = b""
     for block in blocks(path, findings, _MIN_ZEROS):
         text = rest + block
@@ -179,7 +179,7 @@ def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         if len(rest) > BLOCK_BYTES:
             raise RecordingError(
                 f"{path.name}: no line break in {BLOCK_BYTES} bytes; expected the text of a "
-                "VectorNav sensor; is this the right file?"
+                "VectorNav sensor: mend 'reader' in the sensor file, or copy the file again"
             )
         yield text[:cut]
     body, _, check = rest.rpartition(b"$")[2].rpartition(b"*")
@@ -212,7 +212,7 @@ def parse_fields(
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
     """Return fields of records by position, and the number of unreadable sentences.
 
-    ``width``: number of fields of a sentence. An empty one is a missing sample.
+    ``width``: number of fields of a sentence. An empty body is a missing sample.
     """
     whole = [number for number, body in enumerate(bodies) if body.count(b",") == width - 1]
     unread = sum(map(bool, bodies)) - len(whole)
@@ -304,13 +304,12 @@ class VectorNavFile(LogFile):
         if not records.right:
             raise RecordingError(
                 f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
-                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
-                "sensor file right, and the checksum on (register 30)?"
+                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; mend 'column' in the "
+                "sensor file, or switch the checksum on (register 30)"
             )
         records.report(self, f"${kind}", len(FIELDS[kind]))
 
     def _kind(self) -> str:
-        """Return the kind of sentence with the columns."""
         wanted = [source.column for source in self.sources.values()]
         able = [kind for kind in FIELDS if all(find_position(kind, c) >= 0 for c in wanted)]
         if not able:
@@ -340,7 +339,7 @@ class VectorNavFile(LogFile):
                 "output of the device (registers 6 and 30)"
             )
         raise RecordingError(
-            f"{self.path.name}: {' and '.join(both)} both hold the columns; say which in the "
+            f"{self.path.name}: {' and '.join(both)} both have the columns; name one in the "
             f"sensor file, as in 'column: {both[0]}.{FIELDS[both[0]][-1]}'"
         )
 

@@ -46,22 +46,22 @@ class Kind:
         self.is_inertial = bool(self.units or own)
 
     def read(self, messages: Iterable[bytes]) -> NDArray[Any]:
-        """Return the records of messages; those that are too short are left out."""
+        """Return messages as a structured array, shape (n,); too short messages are omitted."""
         layout = np.dtype(self.fields)
         size = layout.itemsize
         return np.frombuffer(b"".join(m[:size] for m in messages if len(m) >= size), layout)
 
     def figures(self, records: NDArray[Any], column: str) -> NDArray[np.float64]:
-        """Return a column in its unit."""
+        """Return a column of records in its unit, shape (n,)."""
         return records[column].astype(np.float64) * self.factors.get(column, 1.0)
 
 
 class Messages(ABC):
     """Iterator over the messages of a log: names of their kinds, and their bytes.
 
-    ``wanted``: the only kind that is given; empty: all. ``most``: bytes after which reading stops.
-    ``kinds``: those seen so far. ``damaged``: bytes that are no messages. ``cut``: messages cut
-    short by the end.
+    ``wanted``: the only kind that is yielded; empty: all. ``most``: bytes after which reading
+    stops. ``kinds``: kinds seen so far. ``damaged``: number of bytes that are no messages.
+    ``cut``: number of messages cut short by the end.
     """
 
     time_columns: ClassVar[Mapping[str, str]]  # columns with stamps, and their units
@@ -80,7 +80,7 @@ class Messages(ABC):
     def __iter__(self) -> Iterator[tuple[str, bytes]]: ...
 
     def _read_more(self) -> bool:
-        """Read more bytes behind those that are left; return whether there are any."""
+        """Read more bytes after the remaining ones; return whether there are any."""
         ended = self._most is not None and self.read >= self._most
         block = b"" if ended else next(self._source, b"")
         self.read += len(block)
@@ -96,7 +96,7 @@ class Messages(ABC):
         return found is not None or self._read_more()
 
     def _is_wanted(self, kind: Kind | None) -> bool:
-        """Return whether messages of a kind are given, and store it."""
+        """Return whether messages of a kind are yielded, and store the kind."""
         if kind is None or self.wanted not in ("", kind.name) or not kind.columns:
             return False
         if len(self.kinds) < MAX_TOPICS:
@@ -138,7 +138,9 @@ class MessageFile(LogFile):
             }
             yield Batch(seconds, columns)
         if not rows:
-            raise RecordingError(f"{self.path.name}: no whole message {wanted.name}")
+            raise RecordingError(
+                f"{self.path.name}: no complete message {wanted.name}; expected some: record again"
+            )
         if messages.damaged:
             self.note(DamagedBytes(self.path.name, messages.damaged), messages.damaged)
         if messages.cut:
@@ -146,7 +148,6 @@ class MessageFile(LogFile):
             self.note(last, 1, "note")
 
     def _find_kind(self) -> Kind:
-        """Return the kind of message with the columns."""
         stated = {source.variable for source in self.sources.values()} - {None}
         wanted = {str(source.column) for source in self.sources.values()}
         wanted |= set() if self.log.time is None else {str(self.log.time.column)}

@@ -47,10 +47,10 @@ def _make_axis_columns(name: str, first: int) -> dict[str, int]:
 class Layout:
     """Layout of the numbers of a kind of message, after its header."""
 
-    figures: int  # number of numbers
+    figures: int  # how many float64 numbers a message has
     columns: dict[str, int]  # index of each number that can be a column
     units: dict[str, str]  # unit of each column, which ROS fixes
-    covariances: dict[str, int]  # index of the first one of a quantity; its value is -1: absent
+    covariances: dict[str, int]  # index of the first one of each quantity; -1 there: not measured
 
 
 LAYOUTS: dict[str, Layout] = {  # the messages that are read, by type
@@ -69,9 +69,9 @@ LAYOUTS: dict[str, Layout] = {  # the messages that are read, by type
 def decode_messages(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return stamps of the headers, ns, numbers, and soundness of messages of ROS 1 or in CDR.
+    """Return header stamps, ns, numbers, and whether they are valid, of ROS 1 or CDR messages.
 
-    Shape of the numbers: (messages, layout.figures); NaN where a message has another layout.
+    Shapes (m,), (m, layout.figures) and (m,); NaN where a message has another layout.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)
@@ -132,7 +132,7 @@ class RosbagFile(LogFile):
         if time is not None and time.unit != "ns":
             raise RecordingError(
                 f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
-                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
+                "file, but a ROS bag has ns; expected 'unit: ns' of 'time'"
             )
         with closing(open_bag(self.path)) as source:
             topic, kind = self._topic(source)
@@ -162,9 +162,9 @@ class RosbagFile(LogFile):
             yield Batch(time, columns)
         if not sound:
             raise RecordingError(
-                f"{self.path.name}: no message of {topic} can be read, {damaged} are not as their "
-                "type says; expected the bytes that ROS writes (CDR in ROS 2, uncompressed unless "
-                "metadata.yaml is there and says so); record it again or convert it"
+                f"{self.path.name}: no message of {topic} can be read, {damaged} do not match "
+                "their type; expected messages as ROS writes them (in ROS 2 CDR, uncompressed "
+                "unless metadata.yaml states it); record the bag again or convert it"
             )
         self._report(topic, source.unclosed, damaged, absent)
 
@@ -203,7 +203,6 @@ class RosbagFile(LogFile):
             yield written, messages
 
     def _topic(self, source: Source) -> tuple[str, str]:
-        """Return the topic with the columns, and its type."""
         with explain_errors(self.path):
             topics = source.topics()
         stated = {source.variable for source in self.sources.values() if source.variable}
@@ -229,7 +228,7 @@ class RosbagFile(LogFile):
             return chosen[0], able[chosen[0]]
         if chosen:
             raise RecordingError(
-                f"{self.path.name}: several topics hold {wanted}: {_join_names(chosen)}; name one "
+                f"{self.path.name}: several topics have {wanted}: {_join_names(chosen)}; name one "
                 "with 'variable:' at each column in the sensor file"
             )
         cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
@@ -277,7 +276,7 @@ def explain_errors(path: Path) -> Iterator[None]:
 
 
 def open_bag(path: Path) -> Source:
-    """Open a bag (file, or folder of ROS 2), known by its content, or raise RecordingError."""
+    """Open a bag (a file, or a folder of ROS 2) by its content, or raise RecordingError."""
     with explain_errors(path):
         try:
             if path.is_dir():

@@ -22,7 +22,7 @@ _TIME_STRUCT = struct.Struct("<II")
 
 
 class Bag:
-    """A ROS 1 bag; ``unclosed``: it was not closed, or is cut (known after the last message)."""
+    """A ROS 1 bag; ``unclosed``: whether it was not closed, or is cut (known after reading)."""
 
     ros_1 = True
 
@@ -122,7 +122,7 @@ class Bag:
                 "bz2 or lz4; write the bag anew with 'rosbag compress'"
             )
         if len(data) != size:
-            raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
+            raise ValueError(f"a chunk does not have the {size} bytes that its header states")
         at = 0
         while at < len(data):
             middle = at + 4 + _UINT32.unpack_from(data, at)[0]
@@ -194,7 +194,7 @@ def _parse_fields(header: bytes) -> dict[bytes, bytes]:
         end = at + 4 + _UINT32.unpack_from(header, at)[0]
         name, sign, value = header[at + 4 : end].partition(b"=")
         if not sign or end > len(header):
-            raise ValueError("no header of a record")
+            raise ValueError("a record without a valid header")
         fields[name] = value
         at = end
     return fields

@@ -133,13 +133,12 @@ def _check_index(storage: McapReader) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise if a folder has a device or pipe, long metadata, or a file that expands too far."""
+    """Raise RecordingError for a device or pipe, long metadata, or a file that expands too far."""
     for file in sorted(path.iterdir()):
         if not file.is_file() and not file.is_dir():
             raise RecordingError(
-                f"{path.name}: {cut(file.name)} is no file; expected the files of a ROS 2 bag: "
-                "copy "
-                "the bag again"
+                f"{path.name}: {cut(file.name)} is a device or named pipe; expected the files of a "
+                "ROS 2 bag: copy the bag again"
             )
     size = (path / "metadata.yaml").stat().st_size
     if size > bounds.MAX_METADATA:
@@ -155,7 +154,7 @@ def check_folder(path: Path) -> None:
 
 
 def check_database(path: Path) -> None:
-    """Raise if a database is truncated, or if its tables are views or have computed columns."""
+    """Raise RecordingError if a database is truncated, or has views or computed columns."""
     # SQLite would read the missing part of a truncated file as zeros. Old libraries do not update
     # the number of pages; then the two counters differ.
     with path.open("rb") as file:
