@@ -178,11 +178,11 @@ def growing(notes: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "kind", "said"),
     [
-        (pipe, "error", "no regular file"),
+        (pipe, "error", "not a regular file"),
         (lost, "unavailable", "no such file"),
-        (deep, "error", "line 1: not readable as YAML: more than"),
-        (twice, "error", "line 2: not readable as YAML: the key 'device' stands twice"),
-        (growing, "error", "line 6: not readable as YAML: more than"),
+        (deep, "error", "line 1: not readable as YAML: found more than"),
+        (twice, "error", "line 2: not readable as YAML: the key 'device' occurs twice"),
+        (growing, "error", "line 6: not readable as YAML: found more than"),
     ],
 )
 def test_notes_that_cannot_be_used_reject_their_own_recording_alone(

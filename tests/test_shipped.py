@@ -52,7 +52,7 @@ def test_a_folder_that_is_stated_stands_alone_and_must_be_there(lab: Path) -> No
     put_sensor(lab / "config/sensors/mine.yaml")
     assert Plan({"sensors": "config/sensors"}).sensors.keys() == {"mine"}
     for stated in ("nosuch", ["catalogue", "nosuch"]):
-        with pytest.raises(ConfigError, match="nosuch: no such folder; expected one YAML file"):
+        with pytest.raises(ConfigError, match="nosuch: no such folder; expected a YAML file"):
             Plan({"sensors": stated})
     with pytest.raises(ConfigError, match="sensors"):
         read_run({"sensors": []})
@@ -87,7 +87,7 @@ def test_a_run_ends_as_snakemake_does_and_says_why(lab: Path) -> None:
     wrong = [*command, "--config", "sensors=nosuch"]
     done = subprocess.run(wrong, cwd=lab, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "nosuch: no such folder; expected one YAML file a sensor" in done.stderr
+    assert "nosuch: no such folder; expected a YAML file for each sensor" in done.stderr
     assert len(done.stderr.splitlines()) < 10 and not done.stdout
 
 

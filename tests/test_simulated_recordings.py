@@ -153,11 +153,11 @@ def test_a_published_figure_is_taken_to_si_in_the_dimension_of_its_parameter(
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"sensors": [OF_S, OF_T, OF_S]}, "sensors: s stands twice"),
+        ({"sensors": [OF_S, OF_T, OF_S]}, "sensors: s occurs twice"),
         ({"sensors": [OF_S | {"sensor": "q"}]}, "sensors.0.sensor: found 'q'; expected .* s, t"),
         (
             {"sensors": [OF_T, OF_S | {"channels": {"gyro_z": {}}}]},
-            "sensors.1.channels: gyro_z not channels of s: gyro_x, accel_x",
+            "sensors.1.channels: found gyro_z; expected channels of the sensor file s: gyro_x",
         ),
         (with_channel(N="1 deg/sqrt(h)", assumed=["N", "K"]), "gyro_x: assumed: 'K' is no figure"),
         (with_channel(assumed=["noise"]), "gyro_x: assumed: 'noise' is no figure"),
@@ -190,7 +190,7 @@ def test_a_published_figure_is_taken_to_si_in_the_dimension_of_its_parameter(
          "sensors.0.duration: found '0 s'; expected a time above 0"),
         ({"sensors": [OF_S | {"duration": "-1 h"}]}, "sensors.0.duration: found '-1 h'"),
         ({"sensors": [OF_S | {"duration": "9 ms"}]},
-         "sensors.0: duration: 9 ms at 50 Hz hold no sample"),
+         "sensors.0: duration: 9 ms at 50 Hz gives no sample"),
         ({"why": {"drift": "x", "bias": "y"}},
          "why: 'bias' names no published figure; expected drift"),
         ({"sensors": [OF_T], "why": {"drift": "x"}}, "why: 'drift' .* nothing is published"),

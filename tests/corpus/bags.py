@@ -250,7 +250,7 @@ ENTRIES = [
         "ros 2 bag of two sensors",
         holding("mcap", two_imus),
         STAMPED,
-        Rejected(r"a: several topics hold .*: /a, /b; name one with 'variable:'"),
+        Rejected(r"a: several topics have .*: /a, /b; name one with 'variable:'"),
     ),
     Entry(
         "ros 2 bag of temperatures",

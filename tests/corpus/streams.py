@@ -113,7 +113,7 @@ RECEIVERS = [
         "ubx of both messages",
         file(lambda: all_raw() + all_meas(), "log.ubx"),
         ubx(("gyro_x",)),
-        Rejected("both ESF-MEAS and ESF-RAW hold the columns; say which"),
+        Rejected("both ESF-MEAS and ESF-RAW have the columns; select one"),
     ),
     Entry(
         "ubx of nothing",

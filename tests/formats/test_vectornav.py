@@ -324,7 +324,7 @@ def test_a_counter_that_wraps(tmp_path: Path) -> None:
         (
             logged([YMR, IMU]),
             log_format(),
-            r"VNYMR and VNIMU both hold the columns; .* 'column: VNYMR\.gyro_z'",
+            r"VNYMR and VNIMU both have the columns; .* 'column: VNYMR\.gyro_z'",
         ),
         (
             logged([YMR]),

@@ -86,9 +86,9 @@ def test_a_log_has_the_curves_of_its_samples(log) -> None:
         expected = allan.allan_variance(log[name], log.rate)
         np.testing.assert_allclose(curve.variance, expected.variance, rtol=1e-9)
     assert list(imu.allan_variance(log, channels="accel_z")) == ["accel_z"]
-    with pytest.raises(ValueError, match="has no gyro_y; expected of gyro_x, accel_z"):
+    with pytest.raises(ValueError, match="has no gyro_y; expected one of gyro_x, accel_z"):
         imu.allan_variance(log, channels="gyro")
-    with pytest.raises(ValueError, match="a log has its own rate"):
+    with pytest.raises(ValueError, match="a Log has its own rate"):
         imu.allan_variance(log, 10.0)
 
 
@@ -110,10 +110,10 @@ TABLE = pd.DataFrame({"gyro_x [deg/s]": [0.1, 0.2, 0.3]})
         (np.zeros((50, 6)), {"rate": None}, "no rate is given; .*rate='100 Hz'"),
         (np.zeros((50, 6)), {"rate": "3 m"}, "rate: 'm' is no unit of frequency"),
         (np.zeros((50, 6)), {"units": {"gyro": "mg"}}, "gyro_x: 'mg' is no unit of angular rate"),
-        (np.zeros((50, 6)), {"units": {"gyros": "mg"}}, "units name 'gyros'"),
+        (np.zeros((50, 6)), {"units": {"gyros": "mg"}}, "units= has the key 'gyros'"),
         (np.zeros((50, 6)), {"units": "deg/s"}, "expected such as {'gyro': 'deg/s'"),
         (np.zeros(50), {"channels": "gyro_u"}, "no channel 'gyro_u'"),
-        (TABLE.rename(columns=lambda _: "gyro_x"), {}, "does not say its unit, which is never"),
+        (TABLE.rename(columns=lambda _: "gyro_x"), {}, "does not state its unit, which is never"),
         (TABLE.rename(columns=lambda _: "wx [deg/s]"), {}, "the column 'wx .deg/s.'"),
         (TABLE, {"units": {"gyro": "rad/s"}}, "in 'deg/s' by the name .* and in 'rad/s' by units="),
         (TABLE.rename(columns=lambda _: "gyro_x [furlong]"), {}, "gyro_x: unknown unit 'furlong'"),
@@ -149,7 +149,7 @@ def test_curves_are_shown_drawn_and_given_as_tables(samples: np.ndarray) -> None
     np.testing.assert_allclose(line.get_ydata(), expected)
     given = curves["gyro_x"].plot(axes[0])
     assert given is axes[0]
-    with pytest.raises(ValueError, match="1 axes; expected one for each of gyro, accel"):
+    with pytest.raises(ValueError, match="1 axes; expected one each for gyro, accel"):
         curves.plot(axes[0])
     one = imu.allan_variance(samples[:, 0], RATE)
     assert "unit" not in one.to_pandas() and "unit of the samples" in one.plot().get_ylabel()

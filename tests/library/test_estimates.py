@@ -114,8 +114,8 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
     ("arguments", "expected"),
     [
         ({"method": "ols"}, "method is 'ols', expected one of robust, likelihood"),
-        ({"method": "compensated"}, "has no readings of the temperature"),
-        ({"rate": 10.0}, "a log has its own rate and units"),
+        ({"method": "compensated"}, "has no temperature, as compensated needs"),
+        ({"rate": 10.0}, "a Log has its own rate and units"),
         ({"seed": -1}, "estimate: seed: found -1"),
         ({"sede": 1}, "did you mean 'seed'"),
         ({"channels": "gyro_z"}, "has no gyro_z"),

@@ -58,13 +58,13 @@ def test_a_sensor_is_a_file_a_name_a_mapping_or_a_draft(drop_zone: Path, log) ->
 
 def test_the_unit_of_a_gyro_is_never_guessed(drop_zone: Path) -> None:
     run = drop_zone / "logs/sensor_1/run.csv"
-    with pytest.raises(ValueError, match=r"does not say channels\.gyro_x\.unit") as error:
+    with pytest.raises(ValueError, match=r"does not state channels\.gyro_x\.unit") as error:
         imu.read_log(run)
     assert "units={'gyro': 'deg/s'}" in str(error.value)
     assert 'gyro_x: {column: wx, unit: "?"}' in str(error.value)
     with pytest.raises(ConfigError, match="'m' is no unit of angular rate"):
         imu.read_log(run, units={"gyro": "m", "accel": "g"})
-    with pytest.raises(ValueError, match="units name 'gyros'"):
+    with pytest.raises(ValueError, match="units= has the key 'gyros'"):
         imu.read_log(run, units={"gyros": "deg/s"})
 
 
@@ -74,7 +74,7 @@ def test_the_unit_of_a_gyro_is_never_guessed(drop_zone: Path) -> None:
         ({"sensor": "sensor_2"}, "did you mean 'sensor_1'"),
         ({"sensor": "none.yaml"}, "none.yaml: no such file"),
         ({"sensor": {"channels": {}}}, "sensor: log: expected 'rate'|channels"),
-        ({"sensor": "sensor_1", "units": {"gyro": "deg/s"}}, "rate= and units= fill in a draft"),
+        ({"sensor": "sensor_1", "units": {"gyro": "deg/s"}}, "rate= and units= complete a draft"),
         ({"path": "none.csv"}, "none.csv: no such file"),
         ({"sensor": "sensor_1", "quality": {"shortest": 100_000}}, "gyro x has 36000 samples"),
         ({"sensor": "sensor_1", "quality": {"knocks": 1}}, "did you mean 'knock'"),

@@ -288,7 +288,5 @@ def test_files_and_folders(tmp_path: Path) -> None:
     assert [file.path.name for file in files] == ["x.csv", "y.csv"]
     with pytest.raises(RecordingError, match=r"expected one file, the folder has x.csv, y.csv"):
         read(folder, log_format())
-    with pytest.raises(
-        RecordingError, match="is a single file, but .file:. in the sensor file expects"
-    ):
+    with pytest.raises(RecordingError, match=r"is a single file, but .file:. in the sensor"):
         read(folder / "x.csv", log_format(per_axis))

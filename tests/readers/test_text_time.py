@@ -209,7 +209,7 @@ def test_a_bad_stamp_late_in_a_log_is_named_by_its_line(tmp_path: Path) -> None:
         ({"column": "t", "format": "%H:%M:%Q"}, "has %Q; expected fields of %Y"),
         ({"column": "t", "format": "%H:%M:%"}, "has %;"),
         ({"column": "t", "format": "%H:%H"}, "has %H twice"),
-        ({"column": "t", "format": "%T", "wraps": 5}, "for numeric stamps; expected 'unit'"),
+        ({"column": "t", "format": "%T", "wraps": 5}, "need numeric stamps; drop 'format'"),
         ({"column": "t", "unit": "s", "date": "d"}, "'date' is given without 'format'"),
         ({"column": "t", "format": "%T", "date": 0}, "columns are counted from 1"),
         ({"column": "t"}, "expected either 'unit'"),

@@ -242,7 +242,7 @@ def test_a_failed_run_says_why_and_is_no_state_to_compare_with(project: Project)
     (project.folder / "sensors").rename(project.folder / "elsewhere")
     status, said = project.run()
     assert status == 2
-    assert "sensors: no such folder; expected one YAML file a sensor" in said
+    assert "sensors: no such folder; expected a YAML file for each sensor" in said
     assert project.summary()["outcome"] == "failed"
     assert (project.nightly / "state.json").read_bytes() == before
     assert (project.nightly / "latest.txt").read_text() in said

@@ -78,7 +78,6 @@ def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
 
 
 def _check_has_numbers(path: Path, tables: Sequence[LogTable]) -> None:
-    """Raise `RecordingError` with the reasons if there is no column of numbers."""
     if any(column.kind == "number" for table in tables for column in table.columns):
         return
     faults = [

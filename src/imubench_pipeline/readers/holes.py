@@ -108,7 +108,6 @@ class ZeroRuns:
         self.lines += int(np.count_nonzero(np.frombuffer(block, np.uint8) == _LINE_FEED))
 
     def _extend(self, block: bytes, begin: int, end: int) -> None:
-        """Add zeros to the current run, or begin a new run."""
         if not self._run and begin < end:
             self._run_begin = self.read + begin, self.lines + block.count(b"\n", 0, begin) + 1
         before, self._run = self._run, self._run + end - begin

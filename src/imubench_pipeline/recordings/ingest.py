@@ -497,7 +497,6 @@ def assemble(
 
 
 def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Yield the columns of several files side by side, a row group at a time."""
     files = [open_parquet(part.data) for part in parts]
     try:
         for group in range(files[0].num_row_groups):

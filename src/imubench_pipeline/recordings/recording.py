@@ -135,7 +135,6 @@ class LogWriter(AbstractContextManager["LogWriter"]):
         self._writer.close()
 
     def _flush(self, rows: int) -> None:
-        """Write the first of the waiting rows, without a copy."""
         waiting = pa.Table.from_batches(self._waiting, schema=self._schema)
         self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
         self._waiting = waiting.slice(rows).to_batches()

@@ -45,8 +45,6 @@ class _Clock:
 
 
 class _Records:
-    """The records of a part, and the columns with a number in each of them."""
-
     def __init__(self, part: Part, stated: float | None, settings: QualitySettings) -> None:
         self._part, self._stated, self._settings = part, stated, settings
         bits = np.arange(len(part.patterns))[:, None] >> np.arange(len(part.columns)) & 1

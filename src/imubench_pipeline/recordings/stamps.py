@@ -197,10 +197,7 @@ def is_set_back(stamps: Array, i: int, step: float, interval: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def _compute_median(stamps: Array, first: int, stop: int) -> float:
-    """Return the median of few stamps, s; NaN if all are missing.
-
-    It compiles in a tenth of the time of `np.nanmedian`.
-    """
+    """Return the median of few stamps, s, or NaN; compiles ten times as fast as `np.nanmedian`."""
     present, number = np.empty(stop - first), 0
     for k in range(first, stop):
         if not np.isnan(stamps[k]):

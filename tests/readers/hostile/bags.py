@@ -199,7 +199,7 @@ BAGS = {
     ),
     "a chunk that is longer than it says": Attack(
         file("a.bag", lambda: bag(connection(), chunk(bytes(200 * MIB), 1000))),
-        "a chunk is not as long as the 1000 bytes that it says",
+        "a chunk does not have the 1000 bytes that its header states",
         channels=IMU,
     ),
     "10001 connections": Attack(
@@ -263,7 +263,7 @@ BAGS = {
         folder_of("message", mcap, names=100), "names a file twice", channels=IMU
     ),
     "a pipe for a file": Attack(
-        folder_of("message", mcap, pipe=True), "'.pipe' is no file", channels=IMU
+        folder_of("message", mcap, pipe=True), "'.pipe' is a device or named pipe", channels=IMU
     ),
     "a connection whose number has 1 MB": Attack(
         file("a.bag", lambda: bag(record({b"op": b"\2", b"conn": b"\xff" * MIB}, b""))),

@@ -53,8 +53,6 @@ class ArrowFile(ArrayFile):
 
 
 class _ArrowTable(Table):
-    """The columns of a schema."""
-
     def __init__(self, schema: pa.Schema) -> None:
         self.schema = schema
         self.labels = schema.names

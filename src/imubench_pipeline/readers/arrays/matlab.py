@@ -257,8 +257,6 @@ def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[table.T
 
 
 class _Inflated(io.RawIOBase):
-    """The data of a compressed element."""
-
     def __init__(self, path: Path, start: int, length: int) -> None:
         super().__init__()
         self._file = path.open("rb")

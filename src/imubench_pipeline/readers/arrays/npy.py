@@ -67,7 +67,6 @@ class NumpyFile(ArrayFile):
 def _read_array_header(
     name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool
 ) -> table.StreamedArray:
-    """Read the header of an array, and compare the promised size with the actual one."""
     shown = name or "the table"
     with opened() as stream:
         version = npy.read_magic(stream)

@@ -147,8 +147,6 @@ class Proof:
 
 @dataclass
 class _FirstRecords:
-    """The first records of one file of a recording."""
-
     columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     rate: float | None = None
     started: str | None = None

@@ -97,7 +97,6 @@ def _has_hour(form: str) -> bool:
 
 
 def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
-    """Return a column of numbers as a clock; None if it is none."""
     if column.kind != "number" or not is_advancing(column.values):
         return None
     words = split_label(column.label)
@@ -155,7 +154,6 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:
-    """Return the guessed unit of stamps, or `UNKNOWN`, and the reason."""
     first = float(values[np.isfinite(values)][0])
     step = estimate_step(values)
     if step is None:

@@ -357,7 +357,6 @@ def _select_best(
 
 
 def _has_equal_entries(clock: Clock, other: Clock) -> bool:
-    """Return whether two clocks have the same entries in a sensor file."""
     if clock.column.source != other.column.source:
         return False
     (own, other_source) = (

@@ -107,8 +107,6 @@ def find_layout(
 
 
 class _Search:
-    """The search for the layout of one file."""
-
     def __init__(
         self, path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
     ) -> None:
@@ -129,10 +127,7 @@ class _Search:
         self._labels = None if log.delimiter is not None else self._find_labels()
 
     def _find_labels(self) -> Labels | None:
-        """Return the labels of the values, and remove them from the lines; None if they have none.
-
-        Raise `RecordingError` if the lines are sentences.
-        """
+        """Remove the labels before values from the lines; return them. RecordingError for prose."""
         texts = [line.text for line in self._lines]
         if (labels := find_labels(texts)) is None:
             if (sentence := find_sentence(texts)) is not None:
@@ -320,7 +315,6 @@ class _Search:
     def _header_and_first(
         self, split: Split, comments: list[_Line], lines: list[_Line]
     ) -> tuple[_Line | None, int]:
-        """Return the header and the index of the first record among the lines."""
         if self._log.header is False:
             return None, 0
         rows = [split.cells(line.text) for line in lines]

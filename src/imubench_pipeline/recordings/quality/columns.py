@@ -220,7 +220,6 @@ def _find_bad_values(
     rate: float,
     settings: QualitySettings,
 ) -> Iterator[Finding]:
-    """Yield findings about quantisation, and about stuck, saturated or too frequent values."""
     over_noise = steps.over_noise if steps and math.isfinite(steps.over_noise) else None
     if steps is not None and _is_rounding_dominant(steps):
         coarse = samples.Coarse(steps.levels, steps.step, over_noise, steps.hidden)
@@ -257,7 +256,6 @@ def _find_changes(
     rate: float,
     settings: QualitySettings,
 ) -> Iterator[Finding]:
-    """Yield findings about motion, steps of the mean, warm-up and changes of the noise."""
     blocks = column.blocks()
     moves = find_steps(blocks, settings.step)
     # On the edge between two values of a coarse register the spread is half a step, and the mean

@@ -180,7 +180,6 @@ def _match_window(
 
 @njit(cache=True, nogil=True)
 def _drop_windows(limit: np.uint64, keys: Words, places: Numbers, numbers: Numbers) -> None:
-    """Remove the windows with a hash above the limit."""
     kept_keys, kept_places = np.empty(keys.size, np.uint64), np.empty((keys.size, 2), np.int64)
     number = 0
     for slot in range(keys.size):

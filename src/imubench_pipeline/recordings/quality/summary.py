@@ -258,7 +258,6 @@ class ColumnSummary:
 
 @njit(cache=True, nogil=True)
 def _close_block(state: Array, row: Array) -> None:
-    """Write the statistics of a block to a row and begin the next."""
     count = state[_BLOCK_COUNT]
     row[0] = count
     if count > 0:
@@ -359,7 +358,6 @@ def _find_extremes(piece: Array, last: float) -> tuple[float, float, float]:
 
 @njit(cache=True, nogil=True)
 def _count_each_sample(piece: Array, state: Array) -> None:
-    """Add samples one by one."""
     last, run, step = state[_LAST_SAMPLE], state[_RUN_LENGTH], state[_SMALLEST_STEP]
     low, high = state[_LOWEST_SAMPLE], state[_HIGHEST_SAMPLE]
     at_low, at_high = state[_COUNT_AT_LOWEST], state[_COUNT_AT_HIGHEST]
