@@ -141,8 +141,8 @@ def compare(
     *logs : Log or Estimates
         Two or more; a log is estimated first.
     names : sequence of str, optional
-        Names of the logs; by default the names of the recordings, with their sensors if these are
-        equal.
+        Names of the logs; by default the names of the recordings, after their sensors if two
+        recordings have the same name.
     tau : sequence of float or str
         Averaging times at which Allan deviations of the models are compared, s or with their unit.
         Times beyond a ninth of the shorter log are left out: the log does not determine them.

@@ -156,12 +156,12 @@ def allan_variance(
         For an array of several columns, the channels of the columns; ``"gyro"`` and ``"accel"`` are
         three axes (six columns are gyro_x to accel_z). For a log or table, the selected channels.
     units : mapping of str to str, optional
-        By ``gyro`` and ``accel``, or by channel: ``{"gyro": "deg/s", "accel": "g"}``.
+        Units, by ``gyro`` and ``accel`` or by channel: ``{"gyro": "deg/s", "accel": "g"}``.
     cluster_sizes : array_like of int, optional
-        n of each tau, log-spaced by default.
+        Samples n of a cluster for each tau, log-spaced by default.
     overlap : {"full", "octave"}
-        All clusters, or clusters that start 1/48 of their length apart: the confidence limits are
-        practically the same, and it is many times faster.
+        ``full``: all clusters. ``octave``: clusters that start 1/48 of their length apart, which is
+        many times faster, with practically the same confidence limits.
     valid : array_like of bool, shape (L,), optional
         False where a sample is missing.
     segments : sequence of (int, int), optional

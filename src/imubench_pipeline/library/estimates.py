@@ -95,12 +95,12 @@ class Estimates(ByChannel[ChannelEstimate]):
     log : Log
         The log of the estimates; arrays are ingested like files.
     name : str
-        Of the log: sensor and recording.
+        Name of the log: sensor and recording.
     method : str
     findings : tuple of Finding
         Findings of ingest and estimation, as in a run with this log only.
     doubts : tuple of DoubtRow
-        Reasons why values may be wrong, as in such a run.
+        Reasons why values may be wrong, as in the same run.
     left_out : dict of str to str
         Channels without an estimate, with the reason.
     rows : Estimation
@@ -185,7 +185,7 @@ class Estimates(ByChannel[ChannelEstimate]):
         target : str
             The program, such as ``kalibr``; ``imubench formats`` lists all.
         path : str or Path, optional
-            Where to write the file, too; a file there is replaced.
+            The file is also written to this path; an existing file is replaced.
         mode : {"bench", "bounded", "in-use"}, optional
             The noise at rest, an upper bound of it, or at least what the authors of the program use
             or recommend; by default ``bench``, and ``in-use`` for programs that fly.
@@ -194,11 +194,11 @@ class Estimates(ByChannel[ChannelEstimate]):
         horizon : float or str
             Longest time without a measurement, s.
         rate : float, optional
-            Of the samples of the program, Hz; by default the rate of the log.
+            Sampling rate of the program, Hz; by default the rate of the log.
         inflation : float
             Factor on every deviation, with its reason ``because``.
         because : str, optional
-            Reason of the inflation, or of the use of an unfit log.
+            Reason for the inflation, or for the use of an unfit log.
 
         Raises
         ------
@@ -251,13 +251,13 @@ def estimate(
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
-        ``robust`` (the Allan variance, with limits that hold for sensors that change), or another
+        ``robust`` (the Allan variance, with limits that also hold if the noise changes), or another
         of the workflow: ``likelihood`` (spectrum), ``likelihood_gm`` (the papers' N, B, T_B, K),
         ``compensated`` (without the temperature effect), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
         For an array, the channels of the columns; for a log or table, the selected channels.
     units : mapping of str to str, optional
-        By ``gyro`` and ``accel``, or by channel; arrays are in SI without them.
+        Units, by ``gyro`` and ``accel`` or by channel; by default, arrays are in SI.
     name : str
         Name of the log, for an array or table.
     threads : int, optional

@@ -95,7 +95,7 @@ def read_columns(
         axis for shape (L,). By default six columns are gyro_x to accel_z, and shape (L,) is gyro_x.
         For a table or mapping, the selected channels.
     units : mapping of str to str, optional
-        By ``gyro``, ``accel``, or channel. Default: SI, but the units of a table must be stated.
+        Units, by ``gyro``, ``accel`` or channel. By default SI; a table must state its units.
 
     Raises ValueError if the shape or a name is not one of these, or a channel has no finite number
     (`UnitError`: a unit is missing, not known or of another dimension).

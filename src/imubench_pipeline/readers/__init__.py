@@ -119,7 +119,8 @@ def _find_file(
 def find_only_log(path: Path, present: list[Path]) -> Path:
     """Return the only log of a folder or archive; raise `RecordingError` if there is not just one.
 
-    Subfolders count only if no file lies directly in it. In an archive, only text files count.
+    ``present``: its files. Those in subfolders count only if there are no others. In an archive,
+    only text files count.
     """
     if not present and not path.is_dir():
         raise RecordingError(

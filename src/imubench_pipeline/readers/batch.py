@@ -72,7 +72,7 @@ class LogFile(ABC):
         """Yield the records in order; `RecordingError` if corrupt, or not as `log` describes."""
 
     def note(self, data: FindingData, value: float, severity: Severity = "warning") -> None:
-        """Add a finding about the whole file."""
+        """Add a finding about the whole file; ``value``: its size, as in `Finding`."""
         self.findings.append(find(data, severity, value))
 
     def contradicted_units(self) -> list[Finding]:
@@ -111,7 +111,7 @@ class LogFile(ABC):
         return np.asarray((stamps - first) * (SECONDS[unit] * scale), np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Convert the values of a column as written to SI: scale * (raw - offset), then unit."""
+        """Convert the values of column ``name`` to SI: scale * (raw - offset), then the unit."""
         source = self.sources[name]
         if name == sensor.POSITION:
             return source.scale * (raw - source.offset)

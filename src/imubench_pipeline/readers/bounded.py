@@ -52,7 +52,7 @@ def run_bounded(
 ) -> T:
     """Return the result of a function in a process of its own, with limits of time and memory.
 
-    ``seconds``: time limit, extended up to five times while the process waits for a core or disk.
+    ``seconds``: time limit; up to five times as long if the process waits for a core or disk.
     ``memory``: limit of additional memory, bytes. Raises `BoundError` if a limit is exceeded, or
     the system ends the process. The result is pickled.
     """
@@ -136,7 +136,7 @@ class Bounded(Generic[T]):
 
 
 def is_kept_waiting(process: psutil.Process, seconds: float) -> bool:
-    """Return whether a process waits for a core or disk; not after ``seconds`` of core time."""
+    """Return whether a process waits for a core or disk; False after ``seconds`` of core time."""
     try:
         waiting = process.status() in (psutil.STATUS_RUNNING, psutil.STATUS_DISK_SLEEP)
     except psutil.NoSuchProcess:

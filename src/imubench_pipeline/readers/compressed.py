@@ -151,7 +151,8 @@ _UNKNOWN_SIZE = 1 << 62
 class Bytes:
     """The decompressed bytes of a log.
 
-    ``name``: of the log, for messages. ``size``: compressed bytes. ``under``: files to close, too.
+    ``name``: of the log, for messages. ``size``: number of compressed bytes. ``under``: streams
+    that are closed with ``stream``.
     """
 
     def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
@@ -474,8 +475,7 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
     Findings about truncated data, and about runs of ``least_zeros`` or more zero bytes, are added
-    to ``findings``.
-    Raises `RecordingError` if the file cannot be opened, or compressed data are corrupt.
+    to ``findings``. Raises `RecordingError` if the file cannot be opened, or is corrupt.
     """
     zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:

@@ -29,7 +29,7 @@ def is_endless(path: Path) -> bool:
 
 
 def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
-    """Return the format that a sensor file states (``reader``); if None, by content."""
+    """Return the format that a sensor file states (``reader``), or if None, by the content."""
     if stated is None:
         return recognise_content(path)[0]
     _refuse_missing_extension(path, stated)
@@ -40,8 +40,8 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
     """Return the format of a log, and its compression; empty if it is not compressed.
 
     ``path``: a file, the folder of a ROS 2 bag, or a member of an archive. A zip archive is text,
-    except for formats that are zip files, as .npz. Raises `RecordingError` if the file cannot be
-    opened, has an unsupported format, or must not be compressed.
+    except for formats that are zip files, such as .npz. Raises `RecordingError` if the file cannot
+    be opened, has an unsupported format, or must not be compressed.
     """
     if (of_folder := recognise_folder(path)) is not None:
         return of_folder, ""

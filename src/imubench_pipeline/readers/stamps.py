@@ -19,7 +19,7 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 class Clock:
     """Converts the stamps of a file to s since the first one, and sets ``started`` of the file.
 
-    ``wraps``: value at which stamps wrap to 0, or None. ``started``: from first stamp to its date.
+    ``wraps``: value at which stamps wrap to 0, or None. ``started``: returns the date of a stamp.
     """
 
     def __init__(

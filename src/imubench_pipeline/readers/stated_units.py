@@ -65,7 +65,7 @@ def parse_unit(text: str, dimension: str) -> str | None:
 def split_unit(label: str, dimension: str) -> tuple[str, str | None]:
     """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
-    Texts in brackets, except numbers, are removed from the name. ``dimension``: of the unit.
+    Texts in brackets, except numbers, are removed from the name. ``dimension``: such as ``time``.
     """
     unit = next(
         (unit for text in find_bracketed(label) if (unit := parse_unit(text, dimension))), None

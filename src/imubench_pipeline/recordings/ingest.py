@@ -460,7 +460,7 @@ def assemble(
     metadata: LogMetadata,
     path: Path,
 ) -> tuple[Path, dict[str, int]]:
-    """Write the columns of files that share a clock to ``path``, unless one uniform file is enough.
+    """Join ``parts``, which share a clock, in the file ``path``; one uniform part is not copied.
 
     Returns the path of the data, and how many samples of each column repeat a stamp (left out).
     """

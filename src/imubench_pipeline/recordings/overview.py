@@ -96,7 +96,7 @@ def no_figures(edges: NDArray[np.int64]) -> Array:
 
 
 def envelope_rows(key: Key, times: Array, figures: Array) -> Iterator[EnvelopeRow]:
-    """Yield rows of ``envelope``: times of edges, s, shape (b + 1,), figures as in `no_figures`."""
+    """Yield rows of ``envelope``; ``times``: edges, s, (b + 1,); ``figures``: see `no_figures`."""
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
         row = EnvelopeRow(**asdict(key), start=start, end=end, samples=int(present))

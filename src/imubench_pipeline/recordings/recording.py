@@ -168,7 +168,7 @@ class ChannelLog:
     table_rate: bool = False  # a column on the same grid has the rate of the rate table
 
     def blocks(self) -> Iterator[Array]:
-        """Yield the samples on the grid, SI, in blocks; NaN if missing. Or raise RecordingError."""
+        """Yield the samples on the grid, SI; NaN if missing. RecordingError for a damaged file."""
         try:
             with open_parquet(self.path) as file:
                 placed = "sample" in file.schema_arrow.names

@@ -217,7 +217,6 @@ def _find_own_clock(
 def _group_by_clock(
     own: dict[str, TimeBase], records: _Records, settings: QualitySettings
 ) -> list[_Clock]:
-    """Group channels with the same rate and most records in common."""
     clocks: list[_Clock] = []
     for name in sorted(own, key=records.count, reverse=True):
         for clock in clocks:

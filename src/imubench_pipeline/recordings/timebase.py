@@ -263,7 +263,6 @@ def _compare_rates(rate: float, stated: float | None, settings: QualitySettings)
 
 
 def _find_drift(track: tracking.Track, settings: QualitySettings) -> list[Finding]:
-    """Return a finding if the sampling interval differs in the second half of the log."""
     if len(track.starts) > 1 or len(track.marks) < 8:
         return []
     points, stamps = np.array(track.marks, dtype=np.float64).T
@@ -333,7 +332,7 @@ def _assume_consecutive(
 
 
 class Groups:
-    """Groups of samples between changes of the stamp: their sizes and durations."""
+    """Groups of consecutive samples with the same stamp: their sizes and durations."""
 
     def __init__(self) -> None:
         self.samples, self.elapsed, self._number = 0, 0.0, 0

@@ -278,7 +278,7 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 
 
 def read_config(file: Path) -> JsonObject:
-    """Return the unchecked settings in a file; empty without a file, ConfigError without keys."""
+    """Return the unchecked settings in a file; empty without a file; ConfigError if not keys."""
     content = read_yaml(file) if file.is_file() else None
     if content is not None and not isinstance(content, dict):
         raise ConfigError(f"{file}: found {cut(content)}, expected keys and values")

@@ -69,7 +69,7 @@ class SimulatedSensors(Strict):
 
     @abstractmethod
     def check(self, channels: "Mapping[Any, AxisSettings]") -> None:
-        """Raise ValueError if the experiment does not support the settings of its channels."""
+        """Raise ValueError if the simulation does not support the settings of a channel."""
 
 
 def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:

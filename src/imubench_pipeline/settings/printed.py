@@ -32,7 +32,7 @@ _NOISE_OVER_CUT_OFF: dict[Filter, float] = {
 
 
 def convert_density(density: float, sidedness: Sidedness) -> float:
-    """Return N of an amplitude density in rad/s/√Hz or m/s²/√Hz.
+    """Return N from an amplitude density in rad/s/√Hz or m/s²/√Hz.
 
     N = density, or density / √2 if it is one-sided (Engers, eq. 7, two-sided as printed).
     """
@@ -40,7 +40,7 @@ def convert_density(density: float, sidedness: Sidedness) -> float:
 
 
 def convert_power_density(density: float, sidedness: Sidedness) -> float:
-    """Return N of a power spectral density, 0 or more, in (rad/s)²/Hz or (m/s²)²/Hz.
+    """Return N from a power spectral density, 0 or more, in (rad/s)²/Hz or (m/s²)²/Hz.
 
     N = √S, or √(S/2) if it is one-sided (Engers, eq. 6, two-sided as printed).
     """
@@ -50,7 +50,7 @@ def convert_power_density(density: float, sidedness: Sidedness) -> float:
 
 
 def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided") -> float:
-    """Return N of a standard deviation, rad/s or m/s², over a noise bandwidth above 0, Hz.
+    """Return N from a standard deviation, rad/s or m/s², over a noise bandwidth above 0, Hz.
 
     N = rms / √(2 bandwidth): a band from 0, as vendors count it, has the power of both signs of
     frequency. It is rms / √bandwidth (Engers, eq. 8) if the bandwidth counts both (``two-sided``).
@@ -61,7 +61,7 @@ def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided
 
 
 def compute_noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
-    """Return the noise bandwidth of a low-pass filter by its -3 dB frequency, both in Hz.
+    """Return the noise bandwidth of a low-pass filter from its -3 dB frequency, both in Hz.
 
     It is π/2 times the cut-off with one pole, π/(2√2) times with a Butterworth filter of second
     order. ``stated``: ``cut_off`` is the noise bandwidth itself, as Bosch, TDK and ST compute.

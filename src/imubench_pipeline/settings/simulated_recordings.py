@@ -82,7 +82,7 @@ class ReadByAuthors(Strict):
 
 
 class SimulatedChannel(AxisSettings):
-    """The truth of one simulated channel, with units as published."""
+    """The true parameters of one simulated channel, with units as published."""
 
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
     published: tuple[PublishedFigure, ...] = ()
@@ -185,7 +185,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def kind(self) -> Kind:
-        """Experiment with the sensor."""
+        """Experiment with the sensor: ``static``, or the key of its settings."""
         return kind_of(stated_experiments(self))
 
 

@@ -50,7 +50,7 @@ _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_
 def cut(
     value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
 ) -> str:
-    """Return a value as text for messages, by ``words``, cut to ``most`` characters."""
+    """Return a value as text for messages, made by ``words`` and cut to ``most`` characters."""
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -102,7 +102,6 @@ class UbxFile(LogFile):
             yield Batch(time, {name: self.to_si(name, raw) for name, raw in wanted.items()})
 
     def _columns(self) -> list[str]:
-        """Return the required columns, each once."""
         return list(dict.fromkeys(str(source.column) for source in self.sources.values()))
 
     def _check_time(self, kind: bytes) -> None:

@@ -92,7 +92,7 @@ class Counts:
         self.others: Counter[str] = Counter()
 
     def report(self, file: LogFile, kind: str, width: int) -> None:
-        """Add findings about text of a log that is no valid ``kind`` with ``width`` fields."""
+        """Add findings about text that is no valid sentence of ``kind`` with ``width`` fields."""
         name, timed = file.path.name, file.log.time is not None
         if count := self.wrong:
             wrong = files.WrongChecksum(name, count, kind, is_sentence=True, is_left_out=timed)
@@ -421,7 +421,6 @@ def list_sentences(path: Path, file_format: formats.FileFormat) -> list[formats.
 
 
 def _describe_time(name: str, cells: list[bytes]) -> list[formats.LogColumn]:
-    """Return a list with the column of stamps, empty if there are no stamps."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
     first = tuple(texts[: formats.MAX_SHOWN_VALUES])
     if not any(texts):

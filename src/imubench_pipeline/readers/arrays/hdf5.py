@@ -86,7 +86,7 @@ def _get_identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
 
 
 class DataSet(Array):
-    """A data set, read by blocks; ``time_axis``: see `Array`."""
+    """A data set of an HDF5 file, read by blocks; ``time_axis``: see `Array`."""
 
     def __init__(self, data: h5py.Dataset, name: str, time_axis: int) -> None:
         try:
@@ -136,7 +136,7 @@ class DataSet(Array):
         return text.strip("\0 \t\r\n")[:_MAX_UNIT_LENGTH] or None
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory for reading these columns that a block does not include, bytes."""
+        """Return the memory, bytes, that reading these columns takes in addition to the blocks."""
         return self._chunk
 
     def row_bytes(self, positions: Sequence[int]) -> int:

@@ -39,7 +39,7 @@ class Column:
 
 
 class Table:
-    """Columns of equal length with a common name in a file."""
+    """An array or table in a file: columns of equal length under one name."""
 
     name: str = ""  # name of the table; empty if the file has one table without a name
     rows: int | None = None  # number of records; None if it is known only after reading
@@ -66,7 +66,7 @@ class Table:
         return 0
 
     def held_bytes(self, positions: Sequence[int]) -> int:
-        """Return the memory for reading these columns that a block does not include, bytes."""
+        """Return the memory, bytes, that reading these columns takes in addition to the blocks."""
         return 0
 
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
@@ -250,7 +250,7 @@ class StreamedArray(Array):
 
 
 def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
-    """Skip bytes of a stream; read them if it cannot seek or ``seek`` is false."""
+    """Skip ``size`` bytes of a stream; read them if it cannot seek or ``seek`` is false."""
     if seek and stream.seekable():
         stream.seek(size, io.SEEK_CUR)
         return

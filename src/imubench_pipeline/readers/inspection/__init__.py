@@ -153,7 +153,7 @@ class _FirstRecords:
 
 
 def check_draft(path: Path, draft: Draft) -> Proof:
-    """Return the result of reading the first records; missing units and rates are arbitrary."""
+    """Try to read the first records with a draft; missing units and rates are set arbitrarily."""
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):
         return Proof(False, f"not read: fill in {_list_keys(unfilled)}")

@@ -181,7 +181,7 @@ def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def estimate_step(values: NDArray[np.float64]) -> float | None:
-    """Return the step from sample to sample, in the unit of the stamps; None if none advances.
+    """Return the step between samples, in the unit of the stamps; None if they do not advance.
 
     If most steps are equal, steps over missing samples are ignored; else, all steps are averaged.
     """

@@ -15,7 +15,7 @@ V_co = TypeVar("V_co", covariant=True)
 
 @dataclass(frozen=True)
 class Entry(Generic[V_co]):
-    """One entry of a sensor file."""
+    """A value in a sensor file, with a comment on its origin."""
 
     value: V_co
     comment: str = ""  # origin of a guessed value; empty if nothing was guessed

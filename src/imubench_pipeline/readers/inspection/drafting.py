@@ -41,7 +41,7 @@ _MIN_CONSTANT_RECORDS = 40  # equal records of all axes of a sensor that was not
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """The axes of one sensor, or a temperature."""
+    """The columns of a log that are the axes of one sensor, or a temperature."""
 
     quantity: Quantity
     table: LogTable

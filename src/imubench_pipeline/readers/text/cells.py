@@ -29,7 +29,7 @@ class Split:
         return text.split(self.delimiter, MAX_COLUMNS)
 
     def names(self, text: str, width: int | None = None) -> list[str]:
-        """Return the names of a header line; delimited by runs, ``width`` names may have spaces."""
+        """Return the names of a header line; single spaces are kept if ``width`` names result."""
         names = self.cells(text)
         if self.runs and width is not None and len(names) != width:
             apart = _NAME_SEPARATOR.split(text.strip())

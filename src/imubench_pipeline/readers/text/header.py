@@ -17,7 +17,7 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
 
 def find_header(lines: Sequence[Sequence[str]]) -> int | None:
-    """Return the index of the (first) line with the most column names, or None.
+    """Return the index of the first line with the most column names; None if no line has names.
 
     ``lines``: the cells of each line before the first record; empty if it is not split like the
     record.
@@ -41,7 +41,7 @@ def has_units(cells: Sequence[str]) -> bool:
 
 
 def complete_names(names: list[str], record: list[str]) -> list[str]:
-    """Return a name for each cell of a record; empty if more than a final delimiter differs."""
+    """Return a name for each cell of a record, apart from a final delimiter; empty on mismatch."""
     if len(names) == len(record) + 1 and not names[-1]:
         return names[:-1]
     if len(names) + 1 == len(record) and not record[-1].strip():

@@ -18,7 +18,7 @@ STAMP_NAME = "time"
 
 @dataclass(frozen=True)
 class Labels:
-    """The labels of all records, in their order."""
+    """The labels before the values of each record, in order."""
 
     names: tuple[str, ...]
     stamped: bool  # the time of day is before each record

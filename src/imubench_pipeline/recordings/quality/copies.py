@@ -159,9 +159,10 @@ _CORRELATION_SIGMAS = 4.0  # standard errors above `_MIN_SHARED_CORRELATION`
 def find_shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """Yield findings about usable axes of one sensor with correlated increments.
 
-    Increments suppress slow signals, such as a temperature effect on all axes. The standard error
-    of a correlation of noise with the autocorrelations a_k and b_k is sqrt(sum a_k b_k / n) (M. S.
-    Bartlett, "Some Aspects of the Time-Correlation Problem", J. R. Stat. Soc. 98, 1935).
+    Increments suppress slow signals, such as a temperature effect on all axes. For n samples of
+    noise with the autocorrelations a_k and b_k, the standard error of the correlation is
+    sqrt(sum a_k b_k / n) (M. S. Bartlett, "Some Aspects of the Time-Correlation Problem", J. R.
+    Stat. Soc. 98, 1935).
     """
     pieces = {name: column.excerpts() for name, column in columns.items()}
     strongest: dict[str, tuple[float, str]] = {}

@@ -36,9 +36,9 @@ def find_outlier_blocks(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the indices of blocks with an outlier, level and noise around them, SI, shape (n,).
 
-    The level is the median of the means of the nearest blocks. The noise is the median of the
-    standard deviations around, at least 2 steps over ``sigmas``. ``sigmas``: least distance of an
-    outlier, in standard deviations. ``step``: least significant bit, SI; None: not quantised.
+    The level is the median of the means of the 4 nearest blocks. The noise is the median standard
+    deviation of 16 blocks on either side, at least 2 ``step`` / ``sigmas``. ``sigmas``: least
+    distance of an outlier, standard deviations. ``step``: least significant bit, SI; None: none.
     """
     least = _MIN_OUTLIER_STEPS * (step or 0.0) / sigmas
     filled = np.isfinite(blocks.spread)
@@ -141,8 +141,8 @@ def detect_interpolation(pieces: Iterable[Excerpt], records: int) -> list[Straig
     """Return the rules that find interpolated samples; none in a log without any.
 
     Samples on a straight line have a second difference of 0, to the rounding of float64, or of the
-    digits of a file. By chance, n such differences follow each other in noise with probability p^n,
-    if one has p. ``records`` is the number of records of the column.
+    digits of a file. If noise has such a difference with probability p, then n of them follow each
+    other with probability p^n. ``records`` is the number of records of the column.
     """
     parts = [piece.values for piece in pieces if len(piece.values) > 2]
     second = np.concatenate([np.abs(np.diff(part, 2)) for part in parts]) if parts else np.empty(0)

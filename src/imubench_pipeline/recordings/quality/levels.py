@@ -42,10 +42,10 @@ all levels are used."""
 def find_hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     """Return the least significant bit, SI, of a register that was rounded again, or None.
 
-    Values k q, scaled and rounded to a digit d, are wrong by up to d / 2: with q = 7.6 d levels
-    differ by 7 d or 8 d. The modulus of their characteristic function, A(f) = |mean exp(2πi f x)|,
-    still has a peak at f = 1 / q, of height sinc(d / q) (Widrow and Kollár 2008, ch. 4). Normal
-    noise without steps gives exp(-2 (π f σ)²).
+    Multiples of the bit q, rounded to a digit d, are wrong by up to d / 2: with q = 7.6 d levels
+    differ by 7 d or 8 d. The modulus of the characteristic function of samples x, A(f) = |mean
+    exp(2πi f x)|, still has a peak at f = 1 / q, of height sinc(d / q) (Widrow and Kollár 2008,
+    ch. 4). Normal noise of standard deviation σ without steps gives exp(-2 (π f σ)²).
     """
     chosen = [piece.present for piece in pieces if len(piece.present) >= _MIN_SAMPLES]
     chosen = chosen[:: max(1, len(chosen) // _MAX_PIECES)][:_MAX_PIECES]
@@ -247,9 +247,9 @@ def summarise_level(column: ColumnSummary, rate: float, unit: str, *, timed: boo
 def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
     """Return bounds of the white noise density N of a column, SI/√Hz, two-sided; ``rate`` in Hz.
 
-    The standard deviation within blocks over √rate is too small behind a low-pass. The Allan
-    deviation of the block means times √τ is too large if slow noise dominates at τ. The upper bound
-    is at least the quantisation noise of the register; it is None if there are too few samples.
+    The standard deviation within blocks over √rate is too small after a low-pass filter. The Allan
+    deviation of the block means times √τ, with the block length τ, is too large if slow noise
+    dominates. The upper bound includes the quantisation noise; None if there are too few samples.
     """
     blocks = column.blocks()
     size, spreads = blocks.size, blocks.spread
