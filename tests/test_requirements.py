@@ -42,7 +42,7 @@ def test_limits_are_in_si(tmp_path: Path) -> None:
         ({"static_window": None}, "either 'static_window' or 'turn_on'"),
         ({"turn_on": {"gyro": "1 deg/s", "accel": "1 mg"}}, "either 'static_window' or 'turn_on'"),
         ({"static_window": None, "turn_on": {"gyro": "-1 deg/s"}}, "a standard deviation from 0"),
-        ({"latitude": "91 deg"}, "between the poles: there cos φ is 0, and a gyro"),
+        ({"latitude": "91 deg"}, "between the poles: at a pole, a gyro"),
         ({"environment": {"temperature_change": "-20 K"}}, "a difference above zero"),
         ({"environment": {"turns": "10 m"}}, "environment.turns"),
         ({"environment": {"speed_chang": "10 m/s"}}, "did you mean 'speed_change'?"),

@@ -162,7 +162,7 @@ def zeros(path: Path) -> None:
 
 ROOMLESS: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "nulls": (nulls, "one/nulls.arrow", "expected at most 800 times"),
-    "chunks": (empty_chunks, "two/chunks.h5", "lies in 20000 chunks"),
+    "chunks": (empty_chunks, "two/chunks.h5", "has 20000 chunks"),
     "zeros": (zeros, "two/zeros.h5", "expected at most 800 times"),
 }
 DEAD = "a dead channel"

@@ -118,7 +118,7 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
         ({"rate": 10.0}, "a Log has its own rate and units"),
         ({"seed": -1}, "estimate: seed: found -1"),
         ({"sede": 1}, "did you mean 'seed'"),
-        ({"channels": "gyro_z"}, "has no gyro_z"),
+        ({"channels": "gyro_z"}, "has no channel gyro_z"),
     ],
 )
 def test_what_cannot_be_estimated_says_why(log, arguments: dict, expected: str) -> None:

@@ -256,7 +256,7 @@ def test_version_5_time(
         ({"variable": "imu"}, "no variable 'imu' for gyro_x; .*has m, turned, counts, imu/wx, im"),
         ({"variable": "imu/name"}, "imu/name for gyro_x holds text"),
         ({"variable": "m", "column": 5}, "no column 5 for gyro_x; m has 4 columns of 60 samples"),
-        ({"column": "m"}, "'m' for gyro_x is a matrix of 4 columns; name the column"),
+        ({"column": "m"}, "'m' for gyro_x is a matrix of 4 columns; name one"),
         ({}, r"several variables \(m, turned, counts, imu/wx, imu/raw/m, t, short\); name the one"),
         ({"variable": "short"}, r"unequal length: \{'gyro_x': 7, 'gyro_y': 60\}"),
     ],

@@ -161,7 +161,7 @@ def test_what_is_no_numbers_is_refused(tmp_path: Path, array: np.ndarray, messag
         ({"gyro_x": {"column": 5, "variable": "m"}}, {}, "no column 5 for gyro_x; m has 4 columns"),
         ({"gyro_x": {"column": 1}}, {}, r"several variables \(m, v, r\); name the one of gyro_x"),
         ({"gyro_x": {"column": 1, "variable": "w"}}, {}, "no variable 'w'.*has m, v, r; mend"),
-        ({"gyro_x": {"column": "m"}}, {}, "'m' for gyro_x is a matrix of 4 columns; name the col"),
+        ({"gyro_x": {"column": "m"}}, {}, "'m' for gyro_x is a matrix of 4 columns; name one"),
         ({"gyro_x": {"column": "m[5]"}}, {}, "no column 5 for gyro_x; m has 4 columns"),
         ({"gyro_x": {"column": "q"}}, {}, "no variable or column 'q' .* has m, v, r, column a, "),
         ({"gyro_x": {"column": "q", "variable": "r"}}, {}, "no column 'q' for gyro_x; r has a, t"),
@@ -275,7 +275,7 @@ def test_archives_in_archives_and_bombs(tmp_path: Path) -> None:
     data = path.read_bytes()
     size = (10**6 + 128).to_bytes(4, "little")
     path.write_bytes(data.replace(size, b"\xf0\xff\xff\xff"))
-    refused(path, log, "a is said to have 4294967280 bytes, which .* cannot hold")
+    refused(path, log, "a is stated to have 4294967280 bytes, which cannot result from")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
         archive.writestr("a.npy", header(shape=(4,)) + bytes(32))
     refused(path, log, "a is packed by method 12; expected stored or deflated")

@@ -153,7 +153,7 @@ def expand_channels(channels: Channels | None) -> list[str] | None:
     with suppress(TypeError):
         asked = [channels] if isinstance(channels, str) else list(channels)
     if strange := [name for name in asked if not isinstance(name, str)]:
-        raise ValueError(f"no channel {strange[0]!r}; expected names: 'gyro', ['gyro_z'] and such")
+        raise ValueError(f"no channel {strange[0]!r}; expected names, as 'gyro' or ['gyro_z']")
     names = [name for each in map(str, asked) for name in _CHANNELS_OF_QUANTITY.get(each, [each])]
     if unknown := [name for name in names if name not in (*CHANNELS, TEMPERATURE)]:
         raise ValueError(
@@ -225,7 +225,7 @@ def _select_columns(
     attrs = getattr(data, "attrs", {}).get("units", {}) if stated else {}
     for name in names:
         if name not in there:
-            raise ValueError(f"no column {name}; found {', '.join(map(str, written))}")
+            raise ValueError(f"no column {name}; found {', '.join(map(str, written))}: name one")
         values = convert_to_numbers(data[there[name]], name)
         if values.ndim != 1:
             raise ValueError(f"{name} has shape {values.shape}, expected one dimension")

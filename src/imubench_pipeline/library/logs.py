@@ -155,7 +155,7 @@ class Log:
         names = expand_channels(channels) or self.channels
         if missing := [name for name in names if name not in self._logs]:
             raise ValueError(
-                f"{self.name} has no {missing[0]}; expected one of {', '.join(self.channels)}"
+                f"{self.name} has no channel {missing[0]}; it has {', '.join(self.channels)}"
             )
         return {name: self._logs[name] for name in names}
 

@@ -48,7 +48,7 @@ def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
     and ``log`` does not name the file of each channel.
     """
     if is_endless(path):
-        raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
+        raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log file")
     # In a fixed order, independent of the sensor file, so that findings and columns are too.
     channels = sorted(log.channels, key=sensor.CHANNELS.index)
     sources = {str(name): log.channels[name] for name in channels}

@@ -56,8 +56,8 @@ class _CompressedParts:
                     and self._size < bounds.MIN_MEAN_PART * self._parts
                 ):
                     raise OSError(
-                        f"{self._parts} compressed parts hold {self._size} bytes, expected more "
-                        f"than {bounds.MIN_MEAN_PART} a part"
+                        f"{self._parts} compressed parts have {self._size} bytes, expected more "
+                        f"than {bounds.MIN_MEAN_PART} per part"
                     )
                 self._parts += 1
             try:
@@ -442,7 +442,7 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     shown = f"{archive.name}/{name}"
     info = _list_directory(archive).get(name)
     if info is None:
-        raise RecordingError(f"{shown}: no such file in the archive, or cut short: pack it again")
+        raise RecordingError(f"{shown}: is not in the archive, or cut short; pack it again")
     if info.flag_bits & _FLAG_ENCRYPTED:
         raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
     if stat.S_ISLNK(info.external_attr >> 16):

@@ -45,7 +45,7 @@ def list_contents(path: Path) -> Contents:
 
 def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
     if not files:
-        raise RecordingError(f"{path.name}: {kind} without a visible file; expected logs in it")
+        raise RecordingError(f"{path.name}: is {kind} without a visible file; put a log into it")
     tables: list[LogTable] = []
     to_state = set()  # the formats that the sensor file must state
     for file in files[:MAX_FILES]:

@@ -114,7 +114,7 @@ class Track:
     grid: int = 0  # number of records, and of grid points up to the last record
     off_grid: int = 0
     duplicates: int = 0
-    unstamped: int = 0  # records with a missing or wrong stamp, put on the next grid point
+    unstamped: int = 0  # records with a missing or wrong stamp, placed on the next grid point
     holes: int = 0
     longest: int = 0
     longest_at: int = 0  # number of holes; length of the longest, first point of it

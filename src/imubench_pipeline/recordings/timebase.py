@@ -86,7 +86,7 @@ def fit_time_base(
     """
     typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
-        raise RecordingError("the time stamps do not advance; is the column name correct?")
+        raise RecordingError("the time stamps do not advance; mend 'column' of 'time'")
     interval = typical.mean
     if not _MIN_INTERVAL <= interval <= _MAX_INTERVAL:
         raise RecordingError(
@@ -313,7 +313,7 @@ def _assume_consecutive(
         rows += len(block)
         last = latest[-1]
     if groups.elapsed <= 0:
-        raise RecordingError("the time stamps do not advance; is the column name correct?")
+        raise RecordingError("the time stamps do not advance; mend 'column' of 'time'")
     _check_segments(len(starts))
     rate, others = groups.rate()
     at_worst = worst_at / rate

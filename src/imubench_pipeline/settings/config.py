@@ -78,7 +78,7 @@ class EstimateSettings(Strict):
         if len(set(methods)) < len(methods):
             raise ValueError(f"{', '.join(methods)}: a method occurs twice; expected each once")
         if methods == ("compensated",):
-            raise ValueError("compensated requires another method, such as likelihood")
+            raise ValueError("compensated requires another method, such as likelihood: add one")
         return methods
 
 

@@ -155,8 +155,8 @@ class PrintedFigure(Strict):
         if isinstance(self.value, tuple):
             if self.kind not in ("range", "choices"):
                 raise ValueError(
-                    f"value {list(self.value)} with kind {self.kind!r}; expected kind range with "
-                    "[low, high], or choices"
+                    f"value {list(self.value)} with kind {self.kind!r}; expected kind 'range' with "
+                    "[low, high], or kind 'choices'"
                 )
             ordered = len(self.value) == 2 and self.value[0] < self.value[1]
             if self.kind == "range" and not ordered:
@@ -320,8 +320,8 @@ def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> No
                 and convert_to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE
             ):
                 raise ValueError(
-                    f"{key}: found {value:g} {unit}, which no accelerometer has; is a prefix such "
-                    f"as micro missing? expected such as {value:g} u{unit.removeprefix('m')}"
+                    f"{key}: found {value:g} {unit}, which no accelerometer has; expected a value "
+                    f"such as {value:g} u{unit.removeprefix('m')}: the prefix may be lost or wrong"
                 )
 
 

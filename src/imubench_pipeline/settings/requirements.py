@@ -42,8 +42,8 @@ Axis = Literal["worst", "median"]  # the axis of a sensor that a requirement is 
 def _latitude(text: str) -> str:
     if not abs(parse_quantity(text, "angle")) < 1.5707:
         raise ValueError(
-            "expected a latitude between the poles: there cos φ is 0, and a gyro in a horizontal "
-            "axis senses nothing of the Earth's rate"
+            "expected a latitude between the poles: at a pole, a gyro with a horizontal axis "
+            "senses nothing of the Earth's rate"
         )
     return text
 

@@ -62,7 +62,7 @@ class ColumnSource(validation.Strict):
         if isinstance(self.column, int) and self.column < 1:
             raise ValueError(f"column {self.column}: columns are counted from 1")
         if self.scale == 0:
-            raise ValueError("scale is 0; expected unit per count")
+            raise ValueError("scale is 0; expected the unit per count")
         return self
 
 
@@ -110,7 +110,7 @@ class TimeSource(validation.Strict):
             if isinstance(column, int) and column < 1:
                 raise ValueError(f"column {column}: columns are counted from 1")
         if self.date is not None and self.format is None:
-            raise ValueError("'date' is given without 'format'; expected the format of both texts")
+            raise ValueError("'date' is given without 'format'; state one for date and time")
         if self.format is not None:
             _check_stamp_format(self.format)
             if self.wraps is not None or self.scale != 1:
@@ -276,7 +276,7 @@ class UsedPart(validation.Strict):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.end is not None and self.end <= self.start:
-            raise ValueError(f"end {self.end} s is not after start {self.start} s")
+            raise ValueError(f"end {self.end} s is not after start {self.start} s; mend one")
         return self
 
 

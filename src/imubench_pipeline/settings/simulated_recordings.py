@@ -105,7 +105,7 @@ class SimulatedChannel(AxisSettings):
     def _known(self) -> Self:
         stated = {name for name in AxisSettings.model_fields if getattr(self, name) is not None}
         if unknown := set(self.assumed) - stated:
-            raise ValueError(f"assumed: {min(unknown)!r} is no figure of this channel")
+            raise ValueError(f"assumed: {min(unknown)!r} is no figure of this channel; remove it")
         return self
 
 

@@ -139,14 +139,16 @@ def read_yaml(path: Path) -> object:
         for event in yaml.parse(text, Loader=_SAFE):
             if isinstance(event, yaml.AliasEvent):
                 if event.anchor in (anchor for anchor, _ in open_nodes):
-                    raise _make_fault(event, f"*{cut(event.anchor, str)} contains itself")
+                    raise _make_fault(
+                        event, f"*{cut(event.anchor, str)} contains itself; remove it"
+                    )
                 nodes += sizes.get(event.anchor or "", 1)
             elif isinstance(event, yaml.CollectionStartEvent):
                 open_nodes.append((event.anchor, nodes))
                 nodes += 1
                 if len(open_nodes) > MAX_DEPTH:
                     raise _make_fault(
-                        event, f"found more than {MAX_DEPTH} nested lists and mappings"
+                        event, f"found more than {MAX_DEPTH} nested lists and mappings; remove some"
                     )
             elif isinstance(event, yaml.CollectionEndEvent):
                 anchor, before = open_nodes.pop()
@@ -157,7 +159,7 @@ def read_yaml(path: Path) -> object:
                 if event.anchor is not None:
                     sizes[event.anchor] = 1
             if nodes > MAX_NODES:
-                raise _make_fault(event, f"found more than {MAX_NODES} keys and values")
+                raise _make_fault(event, f"found more than {MAX_NODES} keys and values; split it")
         return yaml.load(text, Loader=_Loader)
     except ConfigError:
         raise
@@ -235,5 +237,5 @@ def _read_text(path: Path) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         raise ConfigError(
             f"{path}, line {line}: byte 0x{content[error.start]:02X} is not UTF-8; save the file "
-            "in that encoding"
+            "as UTF-8"
         ) from None

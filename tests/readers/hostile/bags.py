@@ -237,7 +237,7 @@ BAGS = {
     ),
     "MCAP chunks of one time": Attack(
         file("a.mcap", lambda: indexed(33 * MIB, [0, 0, 0])),
-        "chunks of one time have 103809024 bytes",
+        "chunks that overlap have 103809024 bytes",
         channels=IMU,
     ),
     "an MCAP index of one chunk for all times": Attack(

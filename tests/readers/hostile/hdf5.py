@@ -118,7 +118,7 @@ HDF5 = {
         hdf5(long_names), "no variable or column 'wx' .*; the file has .*; mend 'column'", "^listed"
     ),
     "20000 links": Attack(hdf5(links), "more than 20000 objects"),
-    "5000 groups deep": Attack(hdf5(deep_groups), "groups lie more than 64 deep"),
+    "5000 groups deep": Attack(hdf5(deep_groups), "groups are nested 65 deep"),
     "a cycle of groups": Attack(hdf5(cycle), "^read: 100$", "^listed: read so: 2 channels"),
     "chunks of 130 MiB": Attack(
         hdf5(two_chunks(130)), "chunks of 272629760 bytes together", "^listed: "

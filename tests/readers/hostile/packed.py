@@ -15,7 +15,7 @@ from backports import zstd
 
 from tests.readers.hostile.attack import MIB, RECORDS, Attack, file
 
-PARTS = r"10000 compressed parts hold 0 bytes"
+PARTS = r"10000 compressed parts have 0 bytes"
 LOCAL = struct.Struct("<4sHHHHHIIIHH")
 
 

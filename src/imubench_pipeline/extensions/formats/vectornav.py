@@ -316,8 +316,8 @@ class VectorNavFile(LogFile):
             named = ", ".join(map(str, wanted))
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
-                f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
-                f"'column' in the sensor file, expected the columns of one sentence of {expected}"
+                f"{self.path.name}: no VectorNav sentence has all of the columns {named}; expected "
+                f"columns of one sentence, {expected}; mend 'column' in the sensor file"
             )
         if len(able) == 1:
             return able[0]

@@ -109,7 +109,7 @@ class ArrayFile(LogFile):
         chunk_bytes = sum(table.held_bytes(wanted[table]) for table in tables)
         if chunk_bytes > MAX_CHUNK_BYTES:
             raise UnusableError(
-                f"the columns lie in chunks of {chunk_bytes} bytes together; expected at most "
+                f"the columns are in chunks of {chunk_bytes} bytes together; expected at most "
                 f"{MAX_CHUNK_BYTES}: repack the file with smaller chunks"
             )
         row_bytes = sum(table.row_bytes(wanted[table]) for table in tables)
@@ -255,8 +255,8 @@ def _find_column(
         table = _check_usable(tables[address], key)
         if table.width > 1:
             raise UnusableError(
-                f"{address!r} for {key} is a matrix of {table.width} columns; name the column "
-                f"with 'column: 2, variable: {address}'"
+                f"{address!r} for {key} is a matrix of {table.width} columns; name one of them, "
+                f"as in 'column: 2, variable: {address}'"
             )
         return table, 0
     if variable is None and (match := _MATRIX_COLUMN.fullmatch(column)) and match[1] in tables:
@@ -312,7 +312,7 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
         return _check_usable(next(iter(tables.values())), key)
     if not usable:
         raise UnusableError(
-            f"no numeric array for {key}; the file has {_describe_contents(tables)}"
+            f"no numeric array for {key}; the file has {_describe_contents(tables)}; save numbers"
         )
     if len(usable) > 1:
         raise UnusableError(

@@ -54,7 +54,7 @@ def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0")
         # The `visit` of the library crashes the process on deeply nested groups.
         if depth > bounds.MAX_GROUP_DEPTH:
             raise UnusableError(
-                f"groups lie more than {bounds.MAX_GROUP_DEPTH} deep; expected the log of one "
+                f"groups are nested {bounds.MAX_GROUP_DEPTH + 1} deep; expected the log of one "
                 "sensor: copy its data sets into a separate file"
             )
         if objects + len(group) > bounds.MAX_OBJECTS:
@@ -212,7 +212,7 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
         )
     if chunks > bounds.MAX_CHUNKS:
         raise UnusableError(
-            f"{name} lies in {chunks} chunks; expected at most {bounds.MAX_CHUNKS}: repack it with "
+            f"{name} has {chunks} chunks; expected at most {bounds.MAX_CHUNKS}: repack it with "
             "h5repack -l"
         )
 

@@ -55,9 +55,9 @@ class NumpyFile(ArrayFile):
             most = table.MAX_DEFLATE_RATIO * (info.compress_size + 8)
             if info.compress_size > size or info.file_size > most:
                 raise table.UnusableError(
-                    f"{name} is said to have {info.file_size} bytes, which {info.compress_size} "
-                    f"packed bytes in a file of {size} cannot hold; the file is corrupt: copy it "
-                    "again"
+                    f"{name} is stated to have {info.file_size} bytes, which cannot result from "
+                    f"{info.compress_size} packed bytes in a file of {size} bytes; the file is "
+                    "corrupt: copy it again"
                 )
             opened = partial(archive.open, info)
             tables.append(_read_array_header(name, opened, info.file_size, checked=True))
@@ -72,7 +72,7 @@ def _read_array_header(
         version = npy.read_magic(stream)
         if version not in _HEADER_SIZE_FORMATS:
             raise table.UnusableError(
-                f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
+                f"{shown} has format version {version}; expected 1.0 to 3.0: save it again"
             )
         length = table.read_exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
         (header_size,) = struct.unpack(_HEADER_SIZE_FORMATS[version], length)

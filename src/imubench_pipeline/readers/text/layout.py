@@ -156,14 +156,14 @@ class _Search:
             if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
                 raise RecordingError(
                     f"{self._file}, line {self._lines[0].number}: holds binary data of no known "
-                    f"format, the bytes {begin[:8].hex(' ')} (hexadecimal) and so on; expected "
+                    f"format, with the first bytes {begin[:8].hex(' ')} (hexadecimal); expected "
                     "text, or a log of a format that 'imubench formats' lists: export it as CSV"
                 )
         split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:
             raise RecordingError(
-                f"{self._file}: no record after the comments; expected some: mend 'comment'"
+                f"{self._file}: no record after the comments; mend 'comment' in the sensor file"
             )
         header, first = self._header_and_first(split, comments, lines)
         for line in lines[: first + 1]:

@@ -209,7 +209,7 @@ class RosbagFile(LogFile):
         if len(stated) > 1:
             raise RecordingError(
                 f"{self.path.name}: columns of the topics {_join_names(sorted(stated))} cannot be "
-                "read together, because each topic has its own clock; expected one topic per file"
+                "read together, because each topic has its own clock; state one topic only"
             )
         able = {
             topic: kind

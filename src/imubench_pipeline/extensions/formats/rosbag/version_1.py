@@ -91,7 +91,7 @@ class Bag:
         if magic != _MAGIC:
             raise RecordingError(
                 f"{self._path.name}: begins with {magic!r}; expected {_MAGIC!r}, a ROS 1 bag of "
-                "version 2.0 ('rosbag migrate' mends an older one)"
+                "version 2.0: convert an older one with 'rosbag migrate'"
             )
         record = _read_record(file)
         if record is None or record[0][b"op"] != _OP_BAG:
@@ -119,7 +119,7 @@ class Bag:
         elif compression != "none":
             raise RecordingError(
                 f"{self._path.name}: a chunk is compressed with {cut(compression)}; expected "
-                "bz2 or lz4; write the bag anew with 'rosbag compress'"
+                "bz2 or lz4; write the bag again with 'rosbag compress'"
             )
         if len(data) != size:
             raise ValueError(f"a chunk does not have the {size} bytes that its header states")

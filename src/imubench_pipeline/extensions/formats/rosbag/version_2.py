@@ -128,7 +128,7 @@ def _check_index(storage: McapReader) -> None:
         size += chunk.uncompressed_size
         if size > bounds.MAX_BAG_OVERLAP:
             raise ValueError(
-                f"chunks of one time have {size} bytes, expected at most {bounds.MAX_BAG_OVERLAP}"
+                f"chunks that overlap have {size} bytes, expected at most {bounds.MAX_BAG_OVERLAP}"
             )
 
 
