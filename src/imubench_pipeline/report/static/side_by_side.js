@@ -103,7 +103,7 @@ kinds.pair = (figure) => {
       margin: { l: 62, r: roomForNames(figure) ? 150 : 26, t: 8, b: 46 }, hovermode: "x", hoversubplots: "axis",
       xaxis: { ...logAxis("averaging time τ (s)", ranges.x), anchor: "y2" },
       yaxis: { ...logAxis(`Allan deviation (${unit.sign})`, ranges.y), domain: upper },
-      yaxis2: { ...logAxis("ratio of Allan deviations", ratioRange), domain: [0, 0.27] },
+      yaxis2: { ...logAxis("ratio of σ", ratioRange), domain: [0, 0.27] },
       annotations: [
         ...(roomForNames(figure) ? directLabels(ends, ranges.y) : []),
         ...(shown(figure, "slopes") ? slopes.annotations : []),
