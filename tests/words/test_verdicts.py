@@ -154,11 +154,11 @@ def test_every_property_has_words(of: Property) -> None:
         ),
         (
             Shortfall("price_class", "consumer", "tactical or chip"),
-            "price class consumer, required: tactical or chip",
+            "price class consumer, required: a class with tactical or chip",
         ),
         (
             Shortfall("price_class", "", "tactical"),
-            "price class not stated, required: tactical",
+            "price class not stated, required: a class with tactical",
         ),
     ],
 )  # fmt: skip
@@ -421,7 +421,7 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
     assert others(rows) == (
         "Also meets the limits: H. Likely meets the limits: E. Meets the limits on conditions: G. "
         "Not enough data: D (no accelerometer). Likely fails: C. "
-        "Fails: B. Excluded: F (price class chip, required: tactical)."
+        "Fails: B. Excluded: F (price class chip, required: a class with tactical)."
     )
 
 
