@@ -154,7 +154,7 @@ _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield every error at every time and axis; times and window in s, the latitude in rad."""
+    """Yield every error at each time, for each axis; times and window in s, latitude in rad."""
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
     for axis in axes:

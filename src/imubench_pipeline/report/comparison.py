@@ -68,7 +68,7 @@ def describe_model(channel: ChannelView, method: str) -> str:
 def make_parameter_cell(
     channel: ChannelView, method: str, symbol: str, duration: float | None, system: System
 ) -> payload.Json:
-    """Return the table cell of a parameter, with value, interval and status of each component."""
+    """Return the table cell of a parameter (value, interval, status); ``duration`` is in s."""
     unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     rows = [row for row in rows if row.status != "absent"] or rows

@@ -32,9 +32,9 @@ _WITHOUT_METHOD = ("mean", "temperature")
 def compare_with_datasheet(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[Json]:
-    """Yield a line per figure of a datasheet: as printed, its readings, measured, verdict.
+    """Yield a line per figure of a datasheet: the printed and measured values, and the verdict.
 
-    ``coverage`` says whether a figure is published, by sensor, quantity and figure.
+    ``coverage`` states whether a figure is published, by sensor, quantity and figure.
     """
     own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
     for rows in _group_by_figure(own).values():
@@ -96,7 +96,7 @@ DEPENDS = "depends on whether the density is one-sided"
 def compare_sensors_with_datasheets(
     views: Sequence[RecordingView], system: System
 ) -> Iterator[Json]:
-    """Yield a line per printed figure and channel: its difference from the sensor's recordings."""
+    """Yield a line per printed figure and channel: the range measured in the recordings."""
     groups: dict[tuple[str, bool, _Figure], list[list[DatasheetRow]]] = {}
     for view in views:
         recommended = view.recommended()

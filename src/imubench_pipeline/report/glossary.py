@@ -25,8 +25,6 @@ _NAMES: Mapping[str, str] = {
 
 
 class _Entry(Strict):
-    """A term in the file."""
-
     name: str | None = None
     short: str
     action: str | None = None
@@ -72,7 +70,7 @@ def read_glossary() -> dict[str, Term]:
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
         for key, entry in entries.items():
             if key in terms:
-                raise ConfigError(f"{_FILE}: {key!r} is already in a section before {section!r}")
+                raise ConfigError(f"{_FILE}: {key!r} is in {section!r} and above it; remove one")
             anchor = f"finding-{key}" if entry.action else section
             name = entry.name or _NAMES.get(key, key.replace("_", " "))
             terms[key] = Term(key, name, entry.short, anchor, entry.action)

@@ -65,7 +65,7 @@ _MAX_REASONS = 2  # of an error in a cell; the tables of a run have all
 def source_number(
     row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
-    """Return ``text`` as a number whose source is ``column`` of a row."""
+    """Return ``text`` as a number whose source is ``column`` of a row of a table."""
     names = [row.table, row.requirement or "", row.sensor]
     names += [row.recording] if isinstance(row, ErrorBudgetRow) else []
     return SourcedNumber(text, "/".join([*names, row.error, f"{row.time:g}", column]), unit)

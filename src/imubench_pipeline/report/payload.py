@@ -55,7 +55,7 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 class Arrays:
     """The arrays of a page, each stored once, as base64 of float32 or of integer codes.
 
-    Code 0 is a missing value (None, NaN); the others divide the range, or its logarithm, evenly.
+    Code 0 is a missing value (None, NaN); other codes divide the range, or its logarithm, evenly.
     Codes of a logarithm are stored as differences modulo 65536, low bytes before high bytes.
     """
 

@@ -66,7 +66,7 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
-    """Return the initial unit on pages of a parameter, ``adev``, ``signal`` or √``psd``."""
+    """Return the initial unit on pages of a parameter, ``adev``, ``signal`` or root of ``psd``."""
     return _find_unit(quantity, symbol, choose_first_units(system)[quantity])
 
 
@@ -118,7 +118,7 @@ def choose_unit(dimension: str, system: System, size: float | None = None) -> Un
 
 
 def list_units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
-    """Return the units of an angle, velocity or length, each with the least SI value it is for."""
+    """Return the units of a dimension, the largest first, each with its smallest value in SI."""
     sign = _SIGNS_OF_DIMENSIONS[system][dimension]
     prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
     prefixes = _MIN_SIZE_OF_PREFIX if prefixed else ((0.0, ""),)

@@ -66,7 +66,7 @@ def make_templates(system: System) -> jinja2.Environment:
     def si(
         value: float | None, unit: str, digits: int | None = None, *, inside: bool = False
     ) -> Markup:
-        """Return an SI number whose unit the reader can switch; ``inside`` a cell that names it."""
+        """Return an SI number whose unit the reader can switch; ``inside``: the cell names it."""
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))
         rounded = f"{value:.7g}"

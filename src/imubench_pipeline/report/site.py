@@ -36,7 +36,7 @@ def make_command(name: str, results: str, options: Mapping[str, str] | None = No
 
 
 def make_recompute_command(target: str, overrides: Sequence[str] = ()) -> str:
-    """Return the command that recomputes the file ``target`` of a recording, with settings."""
+    """Return the command that recomputes a file; ``overrides`` are settings, KEY=VALUE."""
     stated = ["--config", *overrides] if overrides else []
     # After the two dashes, nothing is read as an option.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
@@ -264,7 +264,7 @@ class Site:
 
     @cached_property
     def coverage(self) -> dict[tuple[str, str, str], str]:
-        """Whether a figure is published, as in the table, by sensor, quantity and figure."""
+        """Whether a figure is published (table ``coverage``), by sensor, quantity and figure."""
         rows = self.rows(CoverageRow)
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 

@@ -299,7 +299,7 @@ def _start(site: Site) -> Mapping[str, object]:
 
 
 def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -> str:
-    """Return number, length, dates and states of recordings; ``several``: number of sensors."""
+    """Return number, length, dates and states of recordings, of ``several`` sensors or one."""
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected

@@ -246,7 +246,7 @@ class _Axis:
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
     ) -> Array:
-        """Return the next samples."""
+        """Return the samples ``start`` to ``stop``, which must follow the last ones."""
         model, rate = self._model, self._rate
         size = stop - start
         entering = np.full(size, model.bias)

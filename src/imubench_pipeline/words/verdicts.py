@@ -199,7 +199,7 @@ def worse_than_class_text(quantity: str, cause: Cause, size: float) -> str:
 
 
 def class_limit_text(quantity: str, source: SourceCode, size: float | None) -> str:
-    """Return the worst figure of a class, assumed if none is printed; SI, None for noise."""
+    """Return the worst figure of a class, assumed if none is printed; ``size``: None for noise."""
     figure = ""
     if size is None:
         name = {"N": "white noise", "flicker": "bias instability"}.get(source, source)
@@ -336,12 +336,12 @@ def doubts_text(doubts: Iterable[verdicts.DoubtMark], *, named: bool = False, mo
 
 
 def used_doubts_text(row: comparisons.RankingRow) -> str:
-    """Return the doubts about the recordings of a row of ``ranking``; several are named."""
+    """Return doubts about the recordings of a row of ``ranking``, by name if there are several."""
     return doubts_text(row.doubts, named=(row.recordings or 0) > 1)
 
 
 def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -> str:
-    """Return the margins other than in use: ``noise alone 4.2, likely margin 0.9``."""
+    """Return the further margins of a row: ``noise alone 4.2, likely margin 0.9``."""
     parts = []
     if row.noise_margin is not None:
         parts.append(f"noise alone {number_text(row.noise_margin, 3)}")
@@ -505,7 +505,7 @@ _SINGULAR = re.compile(r"\b([Mm]eet|[Ff]ail)s\b")
 
 
 def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:
-    """Return a next step: ``Record 3 more units: this could settle 1 verdict``; brief: no hints."""
+    """Return a next step: ``Record 3 more units: this could settle 1 verdict``, or ``brief``."""
     parts = []
     if step.verdicts_turned:
         changed = counted(step.verdicts_turned, "verdict")

@@ -102,7 +102,7 @@ def list_standings(
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
-    """Return the standing of one sensor for each limit; ``usual``: spreads of other sensors."""
+    """Return the standing of one sensor for each limit; ``usual``: other sensors' spreads."""
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
         if row.source == "total":

@@ -51,7 +51,7 @@ def density_of_rms(bandwidth: str | None = None, low_pass: str | None = None) ->
 
 
 def curve_plateau(floor: float) -> str:
-    """Return how a bias instability is read; ``floor``: Allan deviation of flicker noise / B."""
+    """Return that a plateau is compared; ``floor``: Allan deviation of flicker noise / B."""
     return f"compared with the plateau of the bias instability, {number_text(floor, 3)} B"
 
 

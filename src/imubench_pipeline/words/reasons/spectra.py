@@ -62,7 +62,7 @@ def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
     """Return the part of N_sensor that bypasses a filter.
 
     ``share``: power of the noise that bypasses the filter, divided by the filtered power;
-    ``factor``: by which N_sensor may be higher.
+    ``factor``: largest N_sensor divided by the estimate.
     """
     return (
         f"white noise with {percent_text(share, 2)} of the filtered power bypasses the {low_pass}, "
