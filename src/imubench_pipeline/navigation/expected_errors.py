@@ -1,7 +1,7 @@
 """Expected navigation errors of a recording, and their growth: rows of two tables."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
@@ -23,10 +23,11 @@ from imubench_pipeline.navigation.error_budget.budget import (
     GYRO_ORDER,
     Start,
     budget,
+    get_angle_factor,
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
-from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity
+from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity, compute_radius_factor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.noise.model import stack_models, sum_over_stacked_terms
@@ -110,10 +111,21 @@ class Question:
         lines = bool(gyro.model.sinusoids or accel.model.sinusoids)
         return time_until(self.limit, lambda time: self._after(time, gyro, accel), oscillates=lines)
 
+    @property
+    def confidence_in_plane(self) -> float | None:
+        """The confidence, if the error is a radius; None: it is along one axis."""
+        return self.confidence if self.error in ("velocity", "position") else None
+
     def _after(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget after a time of dead reckoning; in the plane with a confidence."""
+        """Return the budget after a time of dead reckoning."""
+        along = self.along_axis(time, gyro, accel)
+        radius = self.confidence_in_plane
+        return along if radius is None else along.to_radius(radius)
+
+    def along_axis(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
+        """Return the budget along one axis after a time of dead reckoning, s."""
         assert self.error != "north"
-        along = budget(
+        return budget(
             self.error,
             time,
             gyro=gyro.model,
@@ -123,9 +135,6 @@ class Question:
             gyro_figures=gyro.figures,
             accel_figures=accel.figures,
         )
-        if self.confidence is None or self.error not in ("velocity", "position"):
-            return along
-        return along.to_radius(self.confidence)
 
     def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
@@ -225,6 +234,7 @@ def list_error_rows(
         channel: draw_axis_errors(channel, estimates[channel], errors.figures, draws, seed)
         for channel, errors in axes.items()
     }
+    variances = _draw_variances(lambda channel: [one.model for one in drawn[channel]])
     for question in questions:
         unit = SI_UNITS[DIMENSIONS[question.error]]
         asked = ErrorBudgetRow.taken_from(question, **names, source="total", unit=unit)
@@ -241,12 +251,17 @@ def list_error_rows(
                     )
             yield replace(asked, reasons=tuple(missing))
             continue
+        gyro, accel = chosen["gyro"], chosen["accel"]
         pair = [axes[c] if c else without[q] for q, c in chosen.items()]
         many = [drawn[c] if c else [without[q]] * draws for q, c in chosen.items()]
         nominal, noise, likely, best = question.answer_all(*pair)
-        budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
-        asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        totals = [each.total for each in budgets]
+        if question.error == "north":
+            each = zip(*many, strict=True)
+            totals = np.array([question.answer(*axes_drawn).total for axes_drawn in each])
+        else:
+            assert gyro is not None  # every error needs one
+            totals = _add_figures(variances(question, gyro, accel), question, pair, many)
+        asked = replace(asked, gyro=gyro, accel=accel)
         lower, upper = uncertainty.compute_limits(totals, nominal.total, _TAIL)
         used = [channel for channel in chosen.values() if channel]
         apart = [channel for channel in used if estimates[channel].draws is None]
@@ -273,7 +288,7 @@ def list_error_rows(
             likely=likely,
             best=best,
             drawn="one by one" if apart else "jointly",
-            within=question.limit and uncertainty.compute_chance_within(question.limit, budgets),
+            within=question.limit and uncertainty.compute_chance_within(question.limit, totals),
             reasons=reasons,
             reached_after=question.reached(*pair),
         )
@@ -286,6 +301,83 @@ def list_error_rows(
                 origin=part.figure.origin if part.figure else "measured",
                 largest=largest.get(part.source),
             )
+
+
+def _draw_variances(
+    models: Callable[[str], Sequence[NoiseModel]],
+) -> Callable[[Question, str, str | None], Array]:
+    """Return a function for the variance of an error from noise, for each drawn model of a channel.
+
+    Its arguments are a question, other than ``north``, and the channels of the gyro and of the
+    accelerometer; the result has the shape (draws,).
+    """
+
+    @cache
+    def stack(channel: str) -> tuple[int, list[tuple[NDArray[np.intp], Term]]]:
+        drawn = models(channel)
+        return len(drawn), list(stack_models(drawn))
+
+    @cache
+    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
+        return sum_over_stacked_terms(
+            *stack(channel), lambda term: np.asarray(term.growth(order, time, start))
+        )
+
+    def variance(question: Question, gyro: str, accel: str | None) -> Array:
+        error, time, start = question.error, question.time, question.start
+        assert error != "north"
+        factor = get_angle_factor(error, question.use)
+        total = factor**2 * grown(gyro, GYRO_ORDER[error], time, start.gyro)
+        if error in ACCEL_ORDER and accel:
+            total = total + grown(accel, ACCEL_ORDER[error], time, start.accel)
+        if error == "attitude" and accel and isinstance(start.accel, Calibrated):
+            window = start.accel.window
+            at_rest = grown(accel, 0, window, Uncalibrated(bias=0.0, on_time=0.0))
+            total = total + at_rest / (window * STANDARD_GRAVITY) ** 2
+        return total
+
+    return variance
+
+
+def _add_figures(
+    variance: Array,
+    question: Question,
+    pair: Sequence[AxisErrors],
+    drawn: Sequence[Sequence[AxisErrors]],
+) -> Array:
+    """Return the totals of an error with a variance from noise and drawn figures, shape (draws,).
+
+    ``pair`` and ``drawn`` are the sources, and draws of them, of the gyro and the accelerometer.
+    """
+    gyro, accel = (
+        AxisErrors(
+            figures={
+                cause: replace(figure, sigma=1.0) if figure.spread else figure
+                for cause, figure in axis.figures.items()
+            }
+        )
+        for axis in pair
+    )
+    sizes: dict[tuple[str | None, str], Array] = {
+        (quantity, cause): np.array([each.figures[cause].sigma for each in draws])
+        for quantity, axis, draws in zip(MEASURED, pair, drawn, strict=True)
+        for cause, figure in axis.figures.items()
+        if figure.spread
+    }
+    vectors: list[complex | NDArray[np.complexfloating]] = []
+    for part in question.along_axis(question.time, gyro, accel).contributions:
+        spread = part.figure is not None and part.figure.spread
+        size = sizes[part.source.quantity, part.source.source] if spread else np.ones(1)
+        if part.vector is None:
+            variance = variance + (part.sigma * size) ** 2
+        else:
+            vectors.append(part.vector * size)
+    both = sum((np.abs(vector) ** 2 for vector in vectors), np.zeros(1))
+    confidence = question.confidence_in_plane
+    if confidence is None:
+        return np.sqrt(variance + both)
+    factor = compute_radius_factor(variance, vectors, confidence)
+    return factor * np.sqrt(2.0 * variance + both)
 
 
 def find_largest_figures(
@@ -413,30 +505,11 @@ def list_growth_rows(
     """
     axes = collect_axis_errors(estimates, figures)
 
-    @cache
-    def models(channel: str) -> tuple[int, list[tuple[NDArray[np.intp], Term]]]:
+    def draw(channel: str) -> list[NoiseModel]:
         stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
-        drawn = uncertainty.draw_models(estimates[channel], draws, stream)
-        return len(drawn), list(stack_models(drawn))  # once, and not for each question
+        return uncertainty.draw_models(estimates[channel], draws, stream)
 
-    @cache
-    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
-        return sum_over_stacked_terms(
-            *models(channel), lambda term: np.asarray(term.growth(order, time, start))
-        )
-
-    def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
-        """Return the variances of an error from noise, shape (draws,)."""
-        order = GYRO_ORDER[error]  # type: ignore[index]  # north is not asked for
-        gravity = STANDARD_GRAVITY if order else 1.0
-        total = gravity**2 * grown(gyro, order, time, start)
-        if error in ACCEL_ORDER and accel:
-            total = total + grown(accel, ACCEL_ORDER[error], time, start)
-        if error == "attitude" and accel:
-            at_rest = grown(accel, 0, start.window, Uncalibrated(bias=0.0, on_time=0.0))
-            total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
-        return total
-
+    variances = _draw_variances(draw)
     # The candidate channels for the worst axes, and for each axis alone.
     answerers = {"worst": axes}
     letters = sorted({channel[-1] for channel in axes})
@@ -454,7 +527,7 @@ def list_growth_rows(
             budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
             gyro, accel = chosen["gyro"], chosen["accel"]
             assert gyro is not None  # every error needs one
-            drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
+            drawn = variances(question, gyro, accel)
             row = partial(
                 ErrorGrowthRow,
                 sensor=names["sensor"],

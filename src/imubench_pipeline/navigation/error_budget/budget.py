@@ -96,7 +96,7 @@ def budget(
     Technology", 2nd ed., IEE 2004.
     """
     order = GYRO_ORDER[quantity]
-    factor = _get_factor(quantity, use)
+    factor = get_angle_factor(quantity, use)
     contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, factor))
     if quantity in ACCEL_ORDER:
         contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
@@ -123,8 +123,8 @@ def budget(
     return parts.Budget(time, quantity, contributions)
 
 
-def _get_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
-    """Return the factor of the integrated angle: gravity for a tilt, the speed for a heading."""
+def get_angle_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
+    """Return the factor of the integrated angle: gravity for a tilt, the speed for a track."""
     if quantity == "cross_track":
         return use.speed
     return STANDARD_GRAVITY if GYRO_ORDER[quantity] > 0 else 1.0
@@ -133,7 +133,7 @@ def _get_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
 def _list_levers(
     quantity: parts.Quantity, time: float, start: Start, use: in_use.Use
 ) -> Iterator[tuple[Measured, in_use.Lever]]:
-    order, factor = GYRO_ORDER[quantity], _get_factor(quantity, use)
+    order, factor = GYRO_ORDER[quantity], get_angle_factor(quantity, use)
     direct = quantity == "heading"  # vehicles turn about the vertical
     levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=direct)
     for cause, size, through in levers:

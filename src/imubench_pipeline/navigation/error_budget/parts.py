@@ -8,6 +8,7 @@ from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from imubench_pipeline.model.states import Measured, SourcePath
@@ -60,11 +61,7 @@ class Budget:
         """
         along = math.fsum(part.sigma**2 for part in self.contributions if part.vector is None)
         vectors = [part.vector for part in self.contributions if part.vector is not None]
-        # The variances along the main axes are the mean plus and minus this.
-        mean = along + math.fsum(abs(vector) ** 2 for vector in vectors) / 2.0
-        apart = abs(sum(vector**2 for vector in vectors)) / 2.0
-        ratio = math.sqrt(max(mean - apart, 0.0) / (mean + apart)) if mean else 0.0
-        factor = float(np.interp(ratio, *tabulate_radii(confidence)))
+        factor = float(compute_radius_factor(along, vectors, confidence))
         return replace(
             self,
             contributions=[
@@ -77,6 +74,24 @@ class Budget:
         )
 
 
+def compute_radius_factor(
+    along: float | Array,
+    vectors: Sequence[complex | NDArray[np.complexfloating]],
+    confidence: float,
+) -> Array:
+    """Return the factor of `tabulate_radii` for a sum of independent errors, shape () or (draws,).
+
+    ``along`` is the variance, along each of two axes, of errors without a direction; ``vectors``
+    are errors with a direction.
+    """
+    # The variances along the main axes are the mean plus and minus this.
+    mean = along + sum(np.abs(vector) ** 2 for vector in vectors) / 2.0
+    apart = np.abs(sum(vector**2 for vector in vectors)) / 2.0
+    ratio = np.sqrt(np.maximum(mean - apart, 0.0) / np.maximum(mean + apart, _NO_VARIANCE))
+    return np.asarray(np.interp(ratio, *tabulate_radii(confidence)))
+
+
+_NO_VARIANCE = 1e-300  # divides 0 without an error
 _RADIUS_STEPS = 33
 _ANGLES = 4096
 
