@@ -224,7 +224,8 @@ def _name_property(of: verdicts.Property, subject: str) -> str:
 def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
-        return f"price class {shortfall.subject or 'not stated'}, required: a class with {shortfall.asked}"
+        stated = shortfall.subject or "not stated"
+        return f"price class {stated}, required: a class with {shortfall.asked}"
     name = _name_property(shortfall.property, shortfall.subject)
     _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":
