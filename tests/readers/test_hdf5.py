@@ -173,9 +173,7 @@ def test_what_cannot_be_read_in_blocks(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(arrays, "MAX_CHUNK_BYTES", 1500)
     contents(path, log(channels))
     channels["gyro_y"] = {"column": "imu/wx"}
-    refused(
-        path, log(channels), "the columns are in chunks of 1560 bytes together; expected at mo"
-    )
+    refused(path, log(channels), "the columns are in chunks of 1560 bytes together; expected at mo")
 
 
 def test_what_is_elsewhere_is_not_followed(tmp_path: Path) -> None:

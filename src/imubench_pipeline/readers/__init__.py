@@ -119,8 +119,7 @@ def _find_file(
 def find_only_log(path: Path, present: list[Path]) -> Path:
     """Return the only log of a folder or archive; raise `RecordingError` if there is not just one.
 
-    ``present``: its files. Those in subfolders count only if there are no others. In an archive,
-    only text files count.
+    ``present``: its files. Without others, those in subfolders count; in an archive, only texts.
     """
     if not present and not path.is_dir():
         raise RecordingError(
