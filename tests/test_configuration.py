@@ -179,7 +179,10 @@ def test_simulated_recordings_name_known_sensors_and_channels(tmp_path: Path) ->
     }
     for change, message in (
         ({"sensor": "t"}, "found 't'; expected one of the sensor files: s"),
-        ({"channels": {"gyro_z": {"N": "1 rad/√s"}}}, "gyro_z not channels of s"),
+        (
+            {"channels": {"gyro_z": {"N": "1 rad/√s"}}},
+            "found gyro_z; expected channels of the sensor file s",
+        ),
         ({"channels": {"gyro_x": {"N": "1 m/s"}}}, "is no unit of gyro density"),
         ({"channels": {"gyro_x": {"T_B": "1 s"}}}, "correlation time of B, which is missing"),
         ({"recording": "a"}, "recording: found 'a'"),

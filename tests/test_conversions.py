@@ -69,7 +69,7 @@ def test_noise_bandwidths_are_those_of_the_filters(poles: int, filter_: str) -> 
 
 @pytest.mark.parametrize("bandwidth", [0.0, -1.0])
 def test_a_bandwidth_is_above_zero(bandwidth: float) -> None:
-    with pytest.raises(ValueError, match="expected one above 0"):
+    with pytest.raises(ValueError, match="expected more than 0"):
         noise_of_rms(1.0, bandwidth)
     with pytest.raises(ValueError, match="expected 0 or more"):
         convert_power_density(bandwidth - 1.0, "one-sided")

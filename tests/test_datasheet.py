@@ -594,5 +594,5 @@ def test_every_shipped_datasheet_gives_rows() -> None:
 @pytest.mark.parametrize("unit", ["g/sqrt(Hz)", "mg/sqrt(Hz)"])
 def test_a_noise_that_lost_the_sign_of_micro_says_how_to_write_it(unit: str) -> None:
     sheet = {"accel": {"noise_density": {"value": 130, "unit": unit}}}
-    with pytest.raises(ValueError, match=r"expected such as 130 ug/sqrt\(Hz\)"):
+    with pytest.raises(ValueError, match=r"expected a value such as 130 ug/sqrt\(Hz\)"):
         Datasheet.model_validate(sheet)

@@ -262,6 +262,6 @@ ENTRIES = [
         "ros 2 bag without a message",
         holding("sqlite", lambda: {"/imu": (IMU, [])}),
         STAMPED,
-        Rejected(r"a: no message of /imu can be read, 0 are not"),
+        Rejected(r"a: no message of /imu can be read, 0 do not match"),
     ),
 ]

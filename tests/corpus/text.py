@@ -58,7 +58,7 @@ LAYOUTS = [
         "csv of one column with a decimal comma",
         file(WITH_COMMAS),
         ALONE,
-        Rejected(r"log\.csv, line 1: '0,0.* has decimal commas; expected 'decimal: "),
+        Rejected(r"log\.csv, line 1: '0,0.* with decimal commas; state 'delimiter: "),
     ),
     Entry(
         "csv of one column with a decimal comma stated",
@@ -76,7 +76,7 @@ LAYOUTS = [
         "csv with commas for columns and decimals",
         file(lambda: "".join(f"{x},{x}\n" for x in WITH_COMMAS.split())),
         PLACED,
-        Rejected(r"log\.csv, line 1: '0,0.* has decimal commas; expected 'decimal: "),
+        Rejected(r"log\.csv, line 1: '0,0.* with decimal commas; state 'delimiter: "),
     ),
     Entry(
         "csv by position that begins with fewer columns",

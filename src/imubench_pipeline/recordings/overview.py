@@ -96,7 +96,7 @@ def no_figures(edges: NDArray[np.int64]) -> Array:
 
 
 def envelope_rows(key: Key, times: Array, figures: Array) -> Iterator[EnvelopeRow]:
-    """Yield rows of ``envelope``; ``times``: edges, s, (b + 1,); ``figures``: see `no_figures`."""
+    """Yield rows of ``envelope``: ``times`` of edges, s, shape (b + 1,); figures: `no_figures`."""
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
         row = EnvelopeRow(**asdict(key), start=start, end=end, samples=int(present))
@@ -163,7 +163,7 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
 
 @njit(cache=True, nogil=True)
 def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
-    """Add values, the first at grid point ``reached``, to ``figures`` of their buckets, (b, 4)."""
+    """Add values, from grid point ``reached`` on, to ``figures`` of the buckets, shape (b, 4)."""
     bucket, begin = 0, 0
     while edges[bucket + 1] <= reached:
         bucket += 1
