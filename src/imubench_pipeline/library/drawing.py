@@ -23,7 +23,7 @@ _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
 
 def create_panels(names: Sequence[str], ax: "Axes | Sequence[Axes] | None" = None) -> Any:
-    """Return the given axes, or new ones, at most three in a row: one for each name, (n,).
+    """Return axes, one for each name, shape (n,): the given ones, or new ones, three in a row.
 
     Raises ExtraError if matplotlib is not installed, and ValueError for another number of axes.
     """

@@ -20,7 +20,7 @@ _REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a lon
 
 
 def find_next_data(descriptor: int, offset: int) -> int | None:
-    """Return the offset of the first stored byte at or after an offset, or None; seeks there."""
+    """Seek to the first stored byte at or after ``offset``; return its offset, None at the end."""
     if not hasattr(os, "SEEK_DATA"):
         return offset
     try:
@@ -38,7 +38,7 @@ class FileWithoutHoles:
         self.omitted = 0
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, at most ``size``; none at the end."""
+        """Return the next bytes, at most ``size``; empty at the end."""
         descriptor = self._file.fileno()
         data = find_next_data(descriptor, self._at)
         hole = (os.fstat(descriptor).st_size if data is None else data) - self._at

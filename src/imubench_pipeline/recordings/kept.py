@@ -48,7 +48,7 @@ class KeptFile:
     sha256: str
 
     def is_removed(self, path: Path) -> bool:
-        """Return whether a file is what is left of this one after its samples were removed."""
+        """Return whether a file is the remainder of this one after its samples were removed."""
         try:
             sealed = SEAL in read_footer(path) and not is_seal_broken(path)
             return sealed and read_metadata(path).removed == self.sha256
@@ -60,7 +60,7 @@ class KeptFile:
 class Quality:
     """``quality.json``: the findings of the ingest, the analysed channels, and a digest at its end.
 
-    It has the digests of the samples, so that the results are computed again where these change.
+    It contains the digests of the samples: if they change, the results are computed again.
     """
 
     recording: RecordingRow
@@ -92,7 +92,7 @@ class Quality:
         write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
-        """Return what is wrong with the samples in a folder, or None; ``whole``: read them all."""
+        """Return the fault of the samples in a folder, or None; ``whole``: read the whole files."""
         for name, stated in (self.kept or {}).items():
             path = locate_samples(folder) / name
             try:

@@ -134,7 +134,7 @@ class CommonSettings(Strict):
 
 
 class FusionSettings(Strict):
-    """Settings of the number of cheap sensors that match a good one."""
+    """Settings for computing how many cheap sensors match a good one."""
 
     tau: tuple[Time, ...] = Field(
         ("1 s", "10 s", "100 s", "1000 s"),
@@ -153,7 +153,7 @@ class FusionSettings(Strict):
 
 
 class LimitSettings(Strict):
-    """Limits of a step; a recording or sensor that exceeds them is omitted."""
+    """Limits of time and memory of a step; a recording or sensor that exceeds them is omitted."""
 
     recording: Duration = Field("10 min", description="each step of a recording")
     million_values: Duration = Field(

@@ -64,7 +64,7 @@ _Place = tuple[Table, int]
 
 
 class ArrayFile(LogFile):
-    """A file of arrays, of any format."""
+    """A log file that consists of arrays or tables, in any format."""
 
     @abstractmethod
     def tables(self, stack: ExitStack) -> Iterable[Table]:

@@ -78,7 +78,7 @@ class Table:
 
 
 class UnsupportedArray(Table):
-    """An entry of a file that no reader supports."""
+    """An unsupported array in a file; ``fault``: the reason, as in `Table`."""
 
     def __init__(self, name: str, fault: str) -> None:
         self.name = name

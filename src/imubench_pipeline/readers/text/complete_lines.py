@@ -55,7 +55,7 @@ class _Text:
             raise
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, about ``size``; none at the end."""
+        """Return the next bytes, about ``size``; empty at the end."""
         block, self._begin = self._begin, b""
         while not block and (self._most is None or self.zeros.read <= self._most):
             read = self.bytes.read(size)

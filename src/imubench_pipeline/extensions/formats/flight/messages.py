@@ -105,7 +105,7 @@ class Messages(ABC):
 
 
 class MessageFile(LogFile):
-    """One kind of message of a log."""
+    """The messages of one kind in a log."""
 
     messages: ClassVar[type[Messages]]
 

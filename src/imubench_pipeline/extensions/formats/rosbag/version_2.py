@@ -46,7 +46,7 @@ _Reader = Reader | McapReader | Sqlite3Reader
 
 
 class Bag2:
-    """A ROS 2 bag, from a reader of the library that is not yet opened."""
+    """A ROS 2 bag; ``reader``: of the library, not yet opened."""
 
     ros_1 = False
     unclosed = False
