@@ -34,9 +34,9 @@ from imubench_pipeline.tables.findings import UnavailableError
 def compile_once(locks: IO[bytes]) -> None:
     """Make this process and its forks wait for kernels that another process compiles.
 
-    Else a third of all compilations of a first run are of a kernel that another process compiles.
+    Otherwise, a third of all compilations in a first run would be duplicates.
     `locks`: a file open for writing, never closed, the same for all processes. Each kernel locks
-    the byte of the hash of its name; the system unlocks it when the process ends.
+    one byte, at the hash of its name; the system unlocks it when the process ends.
     """
     load, save = FunctionCache.load_overload, FunctionCache.save_overload
 
@@ -68,7 +68,7 @@ _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork for each job from a socket; its connection gets None, then the cost or `StepError`."""
+    """Fork for each job from a socket; send None at its start, then its cost or a `StepError`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
     ready: dict[Path, bool] = {}
