@@ -250,7 +250,7 @@ def _list_larger_programs(family: Family) -> list[str]:
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
     """Return the curve of one channel from rows of ``allan``; ExportError without any."""
     if not rows:
-        raise imu.ExportError("the channel has no Allan variance")
+        raise imu.ExportError("the channel has no Allan variance; analyse a longer log of it")
     return AllanCurve(
         tau=np.array([row.tau for row in rows]),
         cluster_size=np.array([row.cluster_size for row in rows], dtype=np.int64),
