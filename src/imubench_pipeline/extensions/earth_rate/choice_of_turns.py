@@ -65,7 +65,7 @@ class TurnSchedule:
 def find_turns(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
-    """Return turns (at least one), knocks and doubts for a log without a column, in order.
+    """Return turns (at least one), knocks and doubts of a log without a position column, in order.
 
     The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
     are start and stop, s. Raises ValueError if there is no evidence of turns, nor trust.
@@ -198,7 +198,7 @@ def _follow_schedule(
     slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
-        raise ValueError("the schedule has no turn within the log")
+        raise ValueError(f"the schedule has no turn within the log of {schedule.duration:g} s")
     calm = leave_out_knocks(blocks, list_disturbances([e for e in events if e.kind == "transient"]))
     longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
     shift, z, unshifted = find_best_shift(
@@ -216,8 +216,8 @@ def _follow_schedule(
         if not (size >= _MIN_ALTERNATION_SIGMAS or trust):
             raise ValueError(
                 f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
-                f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "
-                "the schedule's word)"
+                f"and its level alternates by {size:.1f} standard errors; if the log was turned by "
+                "the clock, set trust_schedule"
             )
         doubts.append(
             f"no turns are visible: the schedule is used, and the level alternates with it by "
@@ -243,7 +243,7 @@ def _follow_schedule(
 
 
 def list_disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
-    """Return start and stop, s, of transients to leave out: neither turns nor noise."""
+    """Return start and stop, s, of the transients to leave out, which are clear or short."""
     return [
         (event.start - _KNOCK_MARGIN, event.stop + _KNOCK_MARGIN)
         for event in events
@@ -309,9 +309,9 @@ def find_shorter_dwell(
 ) -> float | None:
     """Return the dwell of the clear transients, s, if it is far shorter than nominal, s.
 
-    If turns come at twice the declared pace, each second turn is taken for a knock, but is
-    periodic. The events are in order of time, with the indices of the turns chosen by the nominal
-    dwell.
+    If turns are twice as frequent as declared, `choose_turns` takes every second one for a knock,
+    but these knocks are periodic. The events are in order of time; ``chosen`` are the indices of
+    the turns by the nominal dwell.
     """
     turns = [events[k] for k in chosen]
     if len(turns) < 2:

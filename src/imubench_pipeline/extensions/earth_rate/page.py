@@ -68,7 +68,7 @@ class EarthRateLine:
 
 @dataclass(frozen=True)
 class Goal:
-    """The requirement for a standard deviation of the Earth's rate."""
+    """The turns and the time that a standard deviation of the Earth's rate requires, as texts."""
 
     goal: str
     turns: str
@@ -102,7 +102,7 @@ class Alignment:
 
 
 def make_turned_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
+    """Return the context of the page of a turned gyro; ``folder``: results of the recording."""
     arrays = Arrays()
     rows = view.rows(EarthRateRow)
     channel = rows[0].channel if rows else ""
