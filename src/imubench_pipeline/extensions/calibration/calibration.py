@@ -71,8 +71,8 @@ def make_calibration_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
-    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
-    of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
+    `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
+    `settings`: of `run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
     tables: dict[str, list[TableRow]] = {name: [] for name in CALIBRATED}
     logs = load_logs(folder)
@@ -233,7 +233,7 @@ def _average_positions(
             break
         dwells.append(Dwell(round(start * rate), stop, 1))
     if len(dwells) < 2:
-        raise ValueError(f"{len(dwells)} positions are in the log; expected two or more")
+        raise ValueError(f"the log has {len(dwells)} complete positions; expected two or more")
     experiment = Experiment(tuple(dwells), rate, 0.0)
     longest = max(one.stop - one.start for one in dwells)
     measured = [block_means(log.blocks(), experiment, longest) for log in axes]

@@ -283,7 +283,6 @@ def describe_noise_model(rows: Sequence[Estimated]) -> str:
 
 
 def _rate_table(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
     arrays, summary = Arrays(), []
@@ -323,7 +322,6 @@ RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     number = rows[0].rates if rows else None
     return {
