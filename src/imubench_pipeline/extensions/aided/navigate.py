@@ -104,7 +104,7 @@ def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
 def collect_tunings(
     folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
-    """Return tunings by name, with ``stand_in`` channels, and why others lack; horizon in s."""
+    """Return models of each tuning, with ``stand_in``, and why others are missing; horizon in s."""
     every = read_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named = _make_printed_models(sensor, declared)

@@ -161,7 +161,7 @@ class Spreads:
         return self.gyro_bias if channel.startswith("gyro") else self.accel_bias
 
     def scale(self, channel: str) -> float:
-        """Return the standard deviation of its relative scale-factor error."""
+        """Return the standard deviation of the relative scale-factor error of a channel."""
         return self.gyro_scale if channel.startswith("gyro") else self.accel_scale
 
 
