@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder",
         type=Path,
         nargs="?",
-        help="folder folder of logs, or a checkout; default: this one",
+        help="folder of logs, or a checkout; default: this one",
     )
     parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
     parser.add_argument(
