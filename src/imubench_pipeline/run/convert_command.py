@@ -96,7 +96,7 @@ def convert_figure(
         if _is_a(unit, signal):
             si = units.find_conversion(unit, signal)[0] * number
             return units.convert_from_si(factor * si, to, f"{sensor}_{result}"), relation
-    raise units.UnitError(f"{option}: the figure is in {unit!r}; expected a unit as deg/s or mg")
+    raise units.UnitError(f"{option}: found the unit {unit!r}; expected one such as deg/s or mg")
 
 
 def _is_a(unit: str, dimension: str) -> bool:

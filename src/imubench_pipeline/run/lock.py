@@ -35,9 +35,8 @@ def locate_lock(results: Path) -> Path:
 class Lock(AbstractContextManager["Lock"]):
     """A lock on a folder of results, which the system releases if the process is killed.
 
-    Each process that has ``descriptor`` open holds the lock; Snakemake inherits it. The file of a
-    held lock has a note about the holder. A note in the file of a free lock is from a run that was
-    killed.
+    Each process that has ``descriptor`` open holds the lock; Snakemake inherits it. The file has a
+    note about the holder; in the file of a free lock, it is from a run that was killed.
     """
 
     def __init__(self, path: Path) -> None:

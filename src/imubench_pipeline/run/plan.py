@@ -60,7 +60,7 @@ _BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")  # inside a text of JSON: others
 
 
 class Plan:
-    """The plan of a run.
+    """The recordings of a run, and the settings of each step, from the configuration.
 
     A ConfigError is raised if the configuration or the list of simulated recordings cannot be used,
     or if a log has the name of a simulated recording. ``stored``: the logs are in an object store,
@@ -160,7 +160,7 @@ class Plan:
         return to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
-        """Return the number of the attempt at a step (`Faults`); a postponed recording keeps it."""
+        """Return the number of the attempt at a step (`Faults.attempt`); if postponed, the last."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
@@ -344,7 +344,7 @@ class Plan:
         return parse_quantity(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
-        """Return the parameters and the log format of a simulated recording."""
+        """Return, as JSON, the parameters and the log format of a simulated recording."""
         recording = self.simulated[sensor, name]
         written = simulations.layout(recording, self.sensors[sensor].log)
         try:
@@ -365,11 +365,11 @@ class Plan:
         )
 
     def settings(self, section: str) -> str:
-        """Return one section of the run's configuration."""
+        """Return, as JSON, one section of the run's configuration."""
         return to_json(getattr(self.run, section))
 
     def datasheet_settings(self, sensor: str) -> str:
-        """Return the settings of the comparison with the datasheet of a sensor."""
+        """Return, as JSON, the settings of the comparison of a sensor with its datasheet."""
         declared = self.sensors.get(sensor)
         return to_json(
             {
@@ -380,7 +380,7 @@ class Plan:
         )
 
     def error_budget_settings(self, sensor: str) -> str:
-        """Return the settings of the error budget of a sensor, with its printed figures."""
+        """Return, as JSON, the settings of a sensor's error budget, with its printed figures."""
         if sensor not in self._of_error_budget:
             self._of_error_budget[sensor] = to_json(
                 {
@@ -393,7 +393,7 @@ class Plan:
         return self._of_error_budget[sensor]
 
     def ranking_settings(self) -> str:
-        """Return the settings of the ranking: requirements, and sensors that are for sale."""
+        """Return, as JSON, the settings of the ranking: requirements, and sensors for sale."""
         sensors = self._for_sale()
         requirements = self._requirements(*_REPORT_KEYS)
         return to_json({"requirements": requirements, "sensors": sensors})
@@ -421,7 +421,7 @@ class Plan:
         }
 
     def report_settings(self) -> str:
-        """Return the settings of the report."""
+        """Return, as JSON, the settings of the report."""
         return to_json(
             {
                 "report": self.run.report,
@@ -464,7 +464,7 @@ class Plan:
                 path.unlink(missing_ok=True)
 
     def catalogue(self, *more: str, sensor: str | None = None) -> str:
-        """Return datasheets, vendor, model, grade and ``more`` keys of a sensor; None: of all."""
+        """Return, as JSON, the datasheets of all sensors or one, with vendor and ``more`` keys."""
         names = self.sensors if sensor is None else {sensor} & self.sensors.keys()
         keys = {"vendor", "model", "grade", "temperature_range", "datasheet", *more}
         return to_json(
@@ -477,16 +477,16 @@ class Plan:
 
     @cached_property
     def usual(self) -> str:
-        """Usual figures of sensors, from the catalogue of the package, which no user edits."""
+        """Usual figures of sensors, as JSON, from the catalogue that the package ships."""
         return usual_as_text(usual_figures(sensor_files.shipped_sensors()))
 
     def truths(self, sensor: str) -> str:
-        """Return the true parameters of the simulated recordings of a sensor."""
+        """Return, as JSON, the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
         return to_json([*map(_dump_for_tables, entries)])
 
     def describe_software(self) -> str:
-        """Return the version of the program, and a digest of all settings that affect results."""
+        """Return, as JSON, the program's version, and a digest of settings that affect results."""
         ignored = {"logs", "results", "sensors", "requirements", "simulated", "held_back"}
         used = {sensor for sensor, _ in self.recordings} & self.sensors.keys()
         settings = [

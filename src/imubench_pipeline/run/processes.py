@@ -59,7 +59,7 @@ class Processes:
     """Runs scripts in forks of one process, which starts with the first script.
 
     The forking process ends with the process of this object, even if that is killed. On Linux the
-    forks end, too; their names are their scripts. A fork goes on if only the forking process ends.
+    forks end, too, and each has the name of its script. A fork goes on if the forking process ends.
     """
 
     def __init__(self) -> None:

@@ -30,7 +30,7 @@ def find_protected_places(path: Path, results: Path | None = None) -> Iterator[P
     The path is absolute, with links resolved. Protected are the configuration of the package, and
     ``config/``, logs, results, sensors, requirements and workflow of each project. A project is a
     folder with ``config/config.yaml``: the working folder, the path, or a folder above the path or
-    `results`. In a folder of results, only folders that runs write, and logs that its report names.
+    `results`. Of results, only folders that runs write, and logs that reports name, are protected.
     """
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]
@@ -128,13 +128,13 @@ def init(options: argparse.Namespace) -> int:
             files[path.relative_to(shipped).as_posix()] = path
     if there := [name for name in files if (folder / name).exists()]:
         raise ConfigError(
-            f"{folder / there[0]}: exists already; choose a folder without this file, or rename "
+            f"{folder / there[0]} exists already; choose a folder without this file, or rename "
             "the file"
         )
     absolute = folder.resolve()
     if results := next((one for one in [absolute, *absolute.parents] if has_results(one)), None):
         raise ConfigError(
-            f"{folder}: is inside the results of runs ({results}); choose a folder outside"
+            f"{folder} is inside the results of runs ({results}); choose a folder outside"
         )
     for made in ("logs", "config/sensors"):
         (folder / made).mkdir(parents=True, exist_ok=True)

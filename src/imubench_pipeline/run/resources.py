@@ -29,7 +29,7 @@ _BYTES_PER_VALUE = 7  # of text: nine digits take eleven, small counts three
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits of a step: time in s, names of its settings, and bytes beside the forking process."""
+    """Limits of a step: time in s, the settings of that time, and additional memory in bytes."""
 
     seconds: float
     words: str

@@ -16,7 +16,7 @@ _MAX_NAMES = 200  # in a pattern: matching more takes longer than the jobs that 
 
 @contextlib.contextmanager
 def seal_outputs(job: Job) -> Iterator[None]:
-    """Seal the outputs and inputs of a job after the block, unless it fails or has no results."""
+    """Seal a job's outputs and inputs after the block, unless this fails, or results is None."""
     if job.results is None:
         yield
         return
@@ -68,7 +68,7 @@ def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
 def limit_wildcards(pattern: str, jobs: Sequence[Mapping[str, str]]) -> str:
     """Restrict the wildcards in a pattern of outputs to the sensors and recordings of jobs.
 
-    Wildcards of more than 200 names stay as they are.
+    A wildcard with more than 200 names is not restricted.
     """
     for key in ("sensor", "recording"):
         names = sorted({of[key] for of in jobs if key in of})

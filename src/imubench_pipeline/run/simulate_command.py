@@ -173,7 +173,7 @@ def _check_depth(out: OutputFile) -> None:
             parts = real.relative_to(logs).parts
             if len(parts) != _LOG_PATH_DEPTH:
                 raise ConfigError(
-                    f"{out}: would be {'/'.join(parts)} in the folder of logs {logs}; expected "
+                    f"{out} would be {'/'.join(parts)} in the folder of logs {logs}; expected "
                     "<sensor>/<recording> in this folder, or a path outside: change --out"
                 )
 

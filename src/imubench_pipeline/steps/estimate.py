@@ -65,7 +65,7 @@ from imubench_pipeline.words.reasons import simulations as texts
 
 @dataclass
 class Estimation:
-    """Rows of the tables of the estimation of a recording."""
+    """Estimates of a recording, as rows of each table that the step writes."""
 
     allan: list[model.AllanRow] = field(default_factory=list)
     parameters: list[model.ParameterRow] = field(default_factory=list)

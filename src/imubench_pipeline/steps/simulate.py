@@ -80,7 +80,7 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
 
 
 def write_recording(settings: str, folder: Path) -> None:
-    """Simulate a recording, as the plan's JSON, into ``folder``, which appears when complete."""
+    """Simulate a recording into ``folder``, which appears when complete; ``settings``: JSON."""
     sections = json.loads(settings)
     recording = SimulatedRecording.model_validate(sections["recording"])
     with make_folder(folder) as made:

@@ -158,7 +158,7 @@ def _describe_effect(rows: Sequence[NavigationRow]) -> str:
 
 
 def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[tuple[int, NavigationLine, list[str]]]:
-    """Yield place, line and overlapping sensors by the error after the longest outage."""
+    """Rank sensors by the error after the longest outage; yield rank, line and tied sensors."""
     for trajectory in dict.fromkeys(row.trajectory for row in rows):
         chosen = [
             row

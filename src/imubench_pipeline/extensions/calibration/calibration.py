@@ -238,7 +238,7 @@ def _average_positions(
     longest = max(one.stop - one.start for one in dwells)
     measured = [block_means(log.blocks(), experiment, longest) for log in axes]
     if {len(one.blocks) for one in measured} != {len(dwells)}:
-        raise ValueError("too many samples of a position are missing")
+        raise ValueError("more than half of the samples of a position are missing")
     angles = np.zeros((len(dwells), 3))
     angles[:, 2] = [declared.angle(number) for number in range(len(dwells))]
     count = np.min([one.blocks.count for one in measured], axis=0)
@@ -371,7 +371,7 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
         if start < gyro.begins or stop > ends + 1.0 / log.rate:
             raise ValueError(
                 f"rate_table.steps: step {number} lasts from {start:g} to {stop:g} s; expected "
-                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: mend "
+                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: correct "
                 "the step, or 'use:' beside the log"
             )
         rate = parse_quantity(step.rate, "angular_rate")

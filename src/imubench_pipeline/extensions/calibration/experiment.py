@@ -187,8 +187,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     The mean is over the samples present; a block with more than half missing is left out. With a
     third of all samples missing, a standard deviation is right to 1 %, or 3 % too small for a
     correlation time of two samples. The parts of the log are in order, rad/s, shape (n,) each; NaN
-    where a sample is missing. Raises ValueError if the log ends before the last dwell, or no block
-    has enough samples.
+    where a sample is missing. ValueError if the log is too short, or all blocks are left out.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)
@@ -207,7 +206,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         raise ValueError(f"the log has {length} samples, expected {whole.stop[-1]} by the dwells")
     enough = count >= np.maximum(_MIN_PRESENT_SHARE * whole.count, 1)
     if not enough.any():
-        raise ValueError("no block has enough samples: all dwells are missing")
+        raise ValueError("no block has enough samples, expected half of a block or more")
     return Measured(
         replace(whole.chosen(enough), count=count[enough]),
         (total[enough] / count[enough])[None, :],

@@ -96,7 +96,7 @@ class RateFilter:
         return compute_deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
-        """Filter runs of one design from finite block means, rad/s, shape (runs, b)."""
+        """Filter runs from finite block means, rad/s, shape (runs, b)."""
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots

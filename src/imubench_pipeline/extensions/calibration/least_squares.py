@@ -126,7 +126,7 @@ class LeastSquares:
         white = solve_triangular(self._root, regressors, lower=True)
         length = np.linalg.norm(white, axis=0)
         if np.any(length == 0.0):
-            raise NotObservableError("a regressor is 0 in all blocks, so it has no parameter")
+            raise NotObservableError("a regressor is 0 in all blocks; its parameter has no effect")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
         if values[-1] < _MIN_SINGULAR_VALUE:
             raise NotObservableError("the data cannot separate the parameters")
@@ -176,7 +176,7 @@ def halve_block_length(
     """Halve a block length, in samples, until shorter blocks give no more information.
 
     A fourth of the returned length would lower none of the standard errors ``sigma`` by 0.1 %, or
-    would give more than ``max_blocks`` blocks. ``sigma`` takes blocks.
+    would give more than ``max_blocks`` blocks. The function ``sigma`` takes the blocks.
     """
 
     @cache

@@ -107,7 +107,7 @@ def lend_axes(channels: Collection[str]) -> dict[str, str]:
 def find_noise_source(
     folder: Path, static: Sequence[Path], key: Key, sensor: Sensor, draws: int = 0
 ) -> NoiseSource | None:
-    """Return the noise of a gyro: `take_static_noise`, or else `take_printed_noise`.
+    """Return the noise of a gyro from a static recording, else from its datasheet, else None.
 
     `folder`: results of the turned recording; `static`: the same of the static recordings of its
     sensor; `draws`: number of models drawn from the uncertainty of a static log.

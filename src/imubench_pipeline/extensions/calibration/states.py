@@ -28,7 +28,7 @@ UNINFORMATIVE_SIGMA = 1.0  # of a prior, rad/s: 14,000 times the Earth's rate
 
 @dataclass(frozen=True)
 class Step:
-    """Transition from the states after a block to the mean of, and the states after, the next."""
+    """Transition from the states after a block to the next block: its mean, and states after it."""
 
     transition: Array  # shape (m + 1, m); the last row gives the mean of the block
     factor: Array  # shape (m + 1, m + 1); a root of the covariance of the noise

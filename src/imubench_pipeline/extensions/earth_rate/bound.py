@@ -119,7 +119,7 @@ def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float =
 
 
 def compute_final_bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return `compute_cramer_rao_bounds` at the end of a run, rad/s."""
+    """Return the Cramér-Rao bound of the rate at the end of a run, rad/s."""
     return float(compute_cramer_rao_bounds(blocks, model, turn_on_bias)[-1])
 
 

@@ -51,7 +51,7 @@ _KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
 
 @dataclass(frozen=True)
 class TurnSchedule:
-    """The stated turns, before any analysis of the log."""
+    """The turns as stated with the log: dwell, start and tolerances."""
 
     # dwell, start, turning, margin: as of `turning.find_turning`, s
     dwell: float
@@ -252,7 +252,7 @@ def list_disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
 
 
 def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
-    """Return the blocks with the blocks of knocks, from start to stop, s, marked as missing."""
+    """Mark the blocks from start to stop, s, of each knock as missing; return all blocks."""
     present = blocks.present.copy()
     for start, stop in knocks:
         first, last = int(start / blocks.length), math.ceil(stop / blocks.length)
@@ -273,8 +273,7 @@ def choose_turns(
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
     mixture about the multiples of the dwell (Student's t of 3 degrees of freedom). The sequence of
     the greatest likelihood is searched again with strength, usual dwell and scatter of the turns
-    found. Nominal dwell, tolerance (standard deviation of an interval) and duration of the log are
-    in s.
+    found. Dwell, tolerance (standard deviation of an interval) and duration of the log are in s.
     """
     if not events:
         return []
@@ -307,7 +306,7 @@ def choose_turns(
 def find_shorter_dwell(
     events: Sequence[Event], chosen: Sequence[int], dwell: float
 ) -> float | None:
-    """Return the dwell of the clear transients, s, if it is far shorter than nominal, s.
+    """Return the dwell of the clear transients, s, if far shorter than the nominal; else None.
 
     If turns are twice as frequent as declared, `choose_turns` takes every second one for a knock,
     but these knocks are periodic. The events are in order of time; ``chosen`` are the indices of
@@ -394,7 +393,7 @@ def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
 
 
 def is_detection_uncertain(turns: Sequence[Event]) -> bool:
-    """Return whether a turn like these may be too weak to detect, by their strengths."""
+    """Return whether other turns, as strong as the given ones, may be too weak to detect."""
     usual, scatter = estimate_strength(turns)
     weak = np.mean(
         [event.kind == "transient" and event.strength < _WEAK_STRENGTH for event in turns]

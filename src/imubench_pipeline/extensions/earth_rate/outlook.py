@@ -57,7 +57,7 @@ _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goa
 
 @dataclass(frozen=True)
 class DwellCurve:
-    """The least standard deviation of the rate for a given run time, over the dwell."""
+    """The least standard deviation of the rate as a function of the dwell, for a run time."""
 
     dwells: NDArray[np.int64]  # shape (k,); number of dwells, increasing
     dwell: Array  # shape (k,); data in each, s
@@ -78,7 +78,7 @@ class DwellCurve:
 
 @dataclass(frozen=True)
 class Outlook:
-    """Predicts how well a turned gyro finds the Earth's rate; linear in dwells beyond 64."""
+    """Predicts how well a turned gyro finds the Earth's rate; extrapolates beyond 64 dwells."""
 
     model: NoiseModel
     latitude: float  # rad

@@ -55,7 +55,7 @@ ESTIMATES = ("filter", "pairs", "triples")
 
 @dataclass(frozen=True)
 class EarthRateLine:
-    """A line of the table of estimates."""
+    """A line of the table of Earth-rate estimates on a page, with its texts."""
 
     row: EarthRateRow
     term: str
@@ -480,7 +480,7 @@ _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
 
 def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
-    """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
+    """Return the predicted alignment of each sensor for a page; ``arrays`` gets the curves."""
     entries = []
     unit = choose_page_unit("gyro", "adev", site.system)
     fine = choose_page_unit("accel", "adev", "si")

@@ -61,7 +61,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Courses:
-    """The estimates of one experiment, and their data."""
+    """The estimates of one experiment by every method, with the block means that they use."""
 
     courses: tuple[Course, ...]  # one per method
     measured: Measured
@@ -243,7 +243,7 @@ class WarmUp:
 
 
 def fit_warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
-    """Fit a warm-up to the mean drifts, rad/s^2, before and in the last part of a run; or None."""
+    """Fit a warm-up to the mean drifts, rad/s^2, before and in a run's last part; None if none."""
     if not 0.0 < last / first < 1.0:
         return None
     rest = duration - last_duration

@@ -62,7 +62,7 @@ def design_paper_run(minutes: float) -> Experiment:
 
 @dataclass(frozen=True)
 class Runs:
-    """Simulated runs of one design, and their truth."""
+    """Simulated block means of runs, with the true errors."""
 
     means: Array  # shape (runs, b); block means, rad/s
     drift: Array  # shape (runs, b); mean slow error over each block, bias included, rad/s

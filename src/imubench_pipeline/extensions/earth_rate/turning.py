@@ -53,8 +53,8 @@ class Stays:
 def find_stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the intervals in which a sensor stays in one of two positions, from a column.
 
-    The positions are the medians of the values below and above mid-range; a sample is in the one
-    within a tenth of their distance. The column, shape (n,), is in any unit, NaN where it is not
+    The positions are the medians of the values below and above mid-range; samples within a tenth of
+    their distance belong to a position. The column, shape (n,), is in any unit, NaN where it is not
     known; an angle must not wrap at a position. The rate is in Hz; stays below ``shortest``, s, are
     overshoots. Raises ValueError if the column has fewer than two positions.
     """

@@ -28,7 +28,7 @@ _MAX_WIDTH = 80
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.description = (
         "Read static logs of one device, judge them, estimate the noise, and write the input file "
         "of a filter or simulator. Several logs are pooled."
@@ -69,7 +69,7 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
     for topics, path in _list_files(options, output.path):
         if path.absolute() in notes:
             raise command_line.CommandError(
-                f"{path}: is the path of the notes of a log; choose another file with --output"
+                f"{path} is the path of the notes of a log; choose another file with --output"
             )
         own = output.beside(path)
         own.check()  # before the log is read

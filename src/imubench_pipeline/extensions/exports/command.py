@@ -24,7 +24,7 @@ NOT_MEASURED = Path()  # --in-use without a log
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.add_argument(
         "results",
         type=Path,
@@ -113,7 +113,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file; return the exit status."""
+    """Write the input file of a program; return the exit status."""
     from imubench_pipeline.extensions.exports.imu import ExportError
 
     try:
@@ -147,7 +147,7 @@ def check_options(options: argparse.Namespace) -> "Program":
 
 
 def make_request(options: argparse.Namespace, **values: Any) -> Any:
-    """Return the `Request` from the options of a command; ``values`` come before the options."""
+    """Return the `Request` from the options of a command; ``values`` replace options."""
     from imubench_pipeline.extensions.exports.request import Request
 
     own = vars(options) | values
@@ -166,7 +166,7 @@ def _build_from_results(options: argparse.Namespace) -> "Imu":
         names = sorted(set(tables["recordings"]["sensor"].to_pylist()))
         if len(names) != 1:
             raise ExportError(
-                f"the results have {len(names)} sensors; add --sensor NAME, with a name of: "
+                f"the results have {len(names)} sensors; add --sensor NAME; there are: "
                 f"{', '.join(names)}"
             )
         (sensor,) = names
@@ -209,8 +209,8 @@ def read_in_use(
 ) -> "Mapping[str, InUseNoise] | None":
     """Return the noise of each channel of a log in use; None without a log.
 
-    ``sensor``: its sensor file; None: a draft, completed by ``stated``. ``cutoff``: of the motion,
-    Hz. Raises ExportError if the log cannot be read, or is too short.
+    ``sensor``: its sensor file; None: a draft, completed by ``stated``. Below ``cutoff``, Hz, noise
+    is taken as motion. Raises ExportError if the log cannot be read, or is too short.
     """
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.in_use import measure_in_use

@@ -139,7 +139,7 @@ class AxisNoise:
     """The axes x, y and z that have an estimate, for programs that take three numbers."""
 
     def inflated(self, factor: float) -> "AxisNoise":
-        """Return the noise with all densities and amplitudes times a factor."""
+        """Return the noise with all densities and amplitudes multiplied by a factor."""
         return replace(
             self,
             model=self.model.scaled(factor),

@@ -104,7 +104,7 @@ def write_json(imu: Imu) -> str:
 
 
 def write_npz(imu: Imu) -> bytes:
-    """Return the matrices of `write_json` as a ``.npz`` file; arrays have names as ``gyro_Phi``."""
+    """Return the matrices of `write_json` as a ``.npz`` file, with arrays such as ``gyro_Phi``."""
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
         continuous, discrete, _ = compute_matrices(axis.model, imu.rate, imu.horizon)

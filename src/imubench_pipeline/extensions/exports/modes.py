@@ -24,7 +24,7 @@ Densities = Mapping[str, tuple[float, float]]  # N and K of gyro and accel, SI
 
 @dataclass(frozen=True)
 class Floor:
-    """Least noise in use by the authors of a program, if the user has no log in use."""
+    """Least noise in use, as recommended by a program's authors, if there is no log in use."""
 
     source: str
     factor: float = 1.0  # on all densities at rest
@@ -88,7 +88,7 @@ def choose_mode(mode: Mode | None, target: str) -> Mode:
 def apply_mode(
     imu: Imu, target: Program, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
 ) -> Imu:
-    """Return the noise of a sensor in a mode, which raises it if ``in-use``, and describe the mode.
+    """Set the mode of an export: raise the noise if ``in-use``, and store the mode in words.
 
     ``measured`` is the noise of a log in use by channel. Raises ExportError in use without such a
     log, if the authors of the program recommend no noise either.

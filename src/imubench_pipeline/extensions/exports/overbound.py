@@ -189,7 +189,7 @@ _FLICKER_TAU_RATIO = 4.0
 
 @dataclass(frozen=True)
 class Overbound:
-    """A model that lies above its limits."""
+    """A noise model above the measured curve and its fit, with its range and its excess."""
 
     model: noise.NoiseModel
     band: tuple[float, float]  # lowest and highest frequency of the bounded density, Hz
@@ -205,7 +205,7 @@ def simultaneous_upper(curve: AllanCurve, longest: float) -> Array:
     """Return simultaneous upper 95 % confidence limits of an Allan variance.
 
     They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
-    The true curve lies below the limits at every tau up to ``longest``, s, with this probability.
+    With 95 % probability, the true curve lies below the limits at every tau up to ``longest``, s.
     The limits are at every tau of the curve, shape (m,), in its unit squared.
     """
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]

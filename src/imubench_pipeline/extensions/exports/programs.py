@@ -34,7 +34,7 @@ _UNITS = {"gyro": {"x": "rad/s", "dx": "rad/s^2"}, "accel": {"x": "m/s^2", "dx":
 
 @dataclass(frozen=True)
 class Form:
-    """A way to state a parameter of a noise model."""
+    """A form in which programs take a noise parameter, such as a density or a variance."""
 
     formula: str  # in N, K, T_B, sigma_B of the process, the rate, and the horizon h
     si: str  # unit, where {x} is the unit of a reading and {dx} of its rate of change

@@ -97,7 +97,7 @@ def pooled(channel: str, recordings: Sequence[str]) -> str:
 def chosen_axis(
     channel: str, recording: str, method: str, rank: str, horizon: float, error: float, unit: str
 ) -> str:
-    """Return a note on the axis that represents a sensor; ``error``, ``unit``, at horizon, s."""
+    """Return a note on the axis that represents a sensor, with its error after the horizon, s."""
     times = number_text(horizon)
     return (
         f"{channel_name(channel)} of recording {recording} by method {method}, {rank} at "
@@ -176,7 +176,7 @@ def axis_slope(
     unit: str,
     lag: float | None,
 ) -> str:
-    """Return the effect of the temperature on an axis, in ``unit`` per K; lag in s."""
+    """Return a note on the temperature effect of an axis, in ``unit`` per K; ``lag`` in s."""
     lower, upper = (0.0 if limit is None else limit for limit in limits)
     bends = f", square {square:.3e} {unit}/K^2" if square else ""
     late = "no lag" if lag is None else f"a lag of up to {number_text(lag, 3)} s is not corrected"

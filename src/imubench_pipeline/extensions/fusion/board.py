@@ -27,7 +27,7 @@ class Parts:
     """Variances of the sensors of a board at several tau.
 
     The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. The parts are
-    stored separately, since the sum loses precision if the shared part is far the largest.
+    stored separately, since the sum loses precision if the shared part is by far the largest.
     """
 
     own: Array  # shape (m, n); independent part of each sensor, SI^2

@@ -17,7 +17,7 @@ _TIME_TYPE = make_number_type(0.0, LONGEST, "a time, such as 10 s", parse_second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
     parser.description = "Arguments after -- go to snakemake, such as --workflow-profile DIR."
     parser.add_argument(

@@ -20,7 +20,7 @@ _MAX_TERMINATION_TIME = 10.0  # s; for a process to end
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
-    """End the steps that a killed run, by its lock note, left in `project`; return their number."""
+    """End steps of a killed run, by its lock note, that still run in `project`; return how many."""
     group = note.get("snakemake")
     if note.get("host") != platform.node() or not isinstance(group, int) or was_restarted(note):
         return 0

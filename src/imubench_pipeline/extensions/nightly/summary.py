@@ -38,7 +38,7 @@ class StateError(ValueError):
 
 
 class Known(NamedTuple):
-    """Digest of the results of a recording, and the events that only one run reports."""
+    """Digest of the results of a recording, and the events that were reported already."""
 
     digest: str
     rejected: str | None = None  # the reason
@@ -199,7 +199,7 @@ class Rejected(BaseModel):
 
 
 class Changes(BaseModel):
-    """Changes since the last successful nightly run; failed, if the tables were not read."""
+    """Changes since the last successful nightly run; ``outcome`` is failed without tables."""
 
     outcome: Outcome = "failed"
     since: datetime | None = None  # end of the run that this one is compared with

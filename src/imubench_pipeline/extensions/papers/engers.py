@@ -50,7 +50,7 @@ class Axis(Strict):
         return Log(self.sensor, RECORDING, f"gyro_{self.axis}")
 
     def meeting(self, scaled: bool) -> float:
-        """Return tau, s, where the -1/2 line of N, or unscaled of the printed value, meets B."""
+        """Return tau, s, where the -1/2 line of N (``scaled``), or of ``psd``, meets the floor."""
         return ((self.density if scaled else self.psd) / self.floor) ** 2
 
 

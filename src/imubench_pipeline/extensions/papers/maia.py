@@ -95,7 +95,7 @@ Range = tuple[float, float, float]  # the quantiles of 5, 50 and 95 %, SI
 
 @dataclass(frozen=True)
 class Lottery:
-    """Scores of single reconstructions against single logs of Table 2, for one grid of tau."""
+    """RMS, as in Table 3, of single reconstructions against single logs, for one grid of tau."""
 
     ranges: tuple[Range, Range]  # reconstructed by Table 1, and by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
@@ -140,7 +140,7 @@ def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
 
 @cache
 def simulate_readings(channel: Channel) -> dict[str, Range]:
-    """Return parameters read from curves of single logs of Table 2 (N at 1 s, K at 1/9 of it)."""
+    """Return parameters read from curves of logs of Table 2 (N at 1 s, K at a ninth of a log)."""
     tau = choose_cluster_sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {
@@ -409,7 +409,7 @@ def compute_datasheet_floor(_: Evidence, key: str) -> Result:
 def integrate_density(model: NoiseModel, tau: float) -> float:
     """Return the Allan variance at a tau, s, by integration of the density, as a reference.
 
-    4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, with x = π f τ.
+    It is 4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, integrated over x = π f τ.
     """
     # The random walk is steep at 0. White noise converges slowly: its tail has the mean 3/8 of
     # sin⁴.
@@ -434,7 +434,10 @@ def evaluate_as_printed(model: NoiseModel, tau: float) -> float:
 
 
 def compute_weight_ratios(tau: float) -> tuple[float, float]:
-    """Return the ratios of the spread at a tau, s, to 2 √(n/2L) σ̂² (meant) and σ̂ (printed)."""
+    """Return the ratios of the spread at a tau, s, to the weights as meant and as printed.
+
+    These are 2 √(n/2L) σ̂² and 2 √(n/2L) σ̂, with n samples in a cluster and L in the log.
+    """
     samples, n = round(DURATION * _RATE), round(tau * _RATE)
     variance = float(_MODEL.allan_variance(tau, _RATE))
     spread = math.sqrt(compute_variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])

@@ -210,7 +210,7 @@ def read_weeks(run: Evidence, name: str) -> Result | None:
 
 
 def compute_error_of_mean(_: Evidence) -> Result:
-    """Return the sigma of the Earth's rate, deg/h, by 1000 samples for each P_0, and by a pair."""
+    """Return the sigma of the Earth's rate, deg/h, from 1000 samples by P_0, and from one pair."""
     hour = DEGREE / 3600.0
     along_axis = {
         name: float(known_rate.mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])

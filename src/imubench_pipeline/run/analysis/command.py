@@ -30,7 +30,7 @@ _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and b
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.description = (
         "Read static logs, report their faults, and estimate the noise parameters of each axis, "
         "like a run of the workflow."

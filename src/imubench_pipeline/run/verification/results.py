@@ -63,7 +63,7 @@ class Results:
 
     @cached_property
     def run_again(self) -> str:
-        """The command of the run, as far as the report states it."""
+        """The command that runs the workflow again, with the settings that the report states."""
         config: list[str] = []
         try:
             settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))

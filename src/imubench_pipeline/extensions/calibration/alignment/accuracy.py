@@ -29,7 +29,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class TriadRuns:
-    """Simulated runs of one design, and their truth."""
+    """Simulated block means of triads at rest, with the true errors of each axis."""
 
     means: Array  # shape (runs, b, 6); block means of gyros and accelerometers, SI
     drift: Array  # shape (runs, b, 6); their slow errors, biases included

@@ -82,7 +82,7 @@ class Positions:
         if not (
             np.allclose(square, np.eye(3), atol=1e-6) and np.all(np.linalg.det(self.turned) > 0)
         ):
-            raise ValueError("turned contains a matrix that is not a rotation")
+            raise ValueError("turned has a matrix that is not a rotation, expected C C^T = I")
 
     @classmethod
     def at_rest(cls, duration: float, block: float, rate: float) -> "Positions":
