@@ -7,9 +7,13 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.expected_errors import (
+    AxisErrors,
+    draw_axis_errors,
     list_error_rows,
     list_growth_rows,
+    list_requirement_questions,
     list_standard_questions,
 )
 from imubench_pipeline.navigation.ratios import (
@@ -17,6 +21,7 @@ from imubench_pipeline.navigation.ratios import (
     compare_deviations,
     list_deviation_rows,
 )
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.verdicts import source_text
 
 NAMES = {"sensor": "alpha", "recording": "night"}
@@ -44,6 +49,56 @@ ESTIMATES = {
     "accel_z": Estimate("curve", {"N": Parameter(5e-3, lower=4e-3, upper=6e-3)}),
 }
 HOW = {"draws": DRAWS, "seed": 7}
+
+
+FIGURES: Figures = {
+    "temperature": Figure(sigma=0.0, spread=2e-6),
+    "scale_factor": Figure(sigma=1e-3),
+    "misalignment": Figure(sigma=1e-3),
+    "turn_on_bias": Figure(sigma=3e-5, spread=1e-5),
+}
+USES = [
+    {"static_window": "2 min", "turns": "360 deg", "speed": "3 m/s"},
+    {"static_window": "5 s", "speed_change": "4 m/s", "confidence": 0.9},
+    {"turn_on": {"on_time": "1 h"}, "axis": "median"},
+    {"turn_on": {"on_time": "1 h", "gyro": "4 deg/h"}, "turns": "90 deg", "speed": "20 m/s"},
+]
+
+
+@pytest.mark.parametrize("use", USES)
+def test_limits_follow_from_the_budget_of_each_draw(use: dict[str, object]) -> None:
+    """The totals of all draws at once are equal to those of one budget after another."""
+    environment = {key: use[key] for key in ("turns", "speed", "speed_change") if key in use}
+    stated = {key: value for key, value in use.items() if key not in environment}
+    limits = [
+        {"error": "attitude", "after": "50 s", "at_most": "0.1 deg"},
+        {"error": "velocity", "after": "20 s", "at_most": "0.5 m/s"},
+        {"error": "position", "after": "20 s", "at_most": "5 m"},
+        {"error": "heading", "after": "100 s", "at_most": "1 deg"},
+    ]
+    if "speed" in environment:
+        limits.append({"error": "cross_track", "after": "30 s", "at_most": "1 m"})
+    environment |= {"temperature_change": "7 K"}
+    asked = Requirement.model_validate(
+        {"title": "t", "limits": limits, "environment": environment} | stated
+    )
+    questions = list(list_requirement_questions("asked", asked))
+    figures = dict.fromkeys(ESTIMATES, FIGURES)
+    drawn = {
+        channel: draw_axis_errors(channel, estimate, FIGURES, DRAWS, HOW["seed"])
+        for channel, estimate in ESTIMATES.items()
+    }
+    rows = list_error_rows(NAMES, ESTIMATES, questions, figures=figures, **HOW)
+    totals = [row for row in rows if row.source == "total"]
+    assert len(totals) == len(questions)
+    for question, row in zip(questions, totals, strict=True):
+        assert row.gyro is not None and row.sigma is not None
+        accel = drawn[row.accel] if row.accel else [AxisErrors()] * DRAWS
+        each = [question.answer(*pair).total for pair in zip(drawn[row.gyro], accel, strict=True)]
+        lower, upper = np.quantile(each, [0.025, 0.975])
+        assert row.lower == pytest.approx(min(lower, row.sigma), rel=1e-12)
+        assert row.upper == pytest.approx(max(upper, row.sigma), rel=1e-12)
+        assert row.upper > row.sigma
 
 
 @cache

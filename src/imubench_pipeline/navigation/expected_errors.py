@@ -1,7 +1,7 @@
 """Expected navigation errors of a recording, and their growth: rows of two tables."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
@@ -23,10 +23,11 @@ from imubench_pipeline.navigation.error_budget.budget import (
     GYRO_ORDER,
     Start,
     budget,
+    get_angle_factor,
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
-from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity
+from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity, compute_radius_factor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.noise.model import stack_models, sum_over_stacked_terms
@@ -52,14 +53,14 @@ class AxisErrors:
     best: NoiseModel | None = None
 
     def at(self, end: End) -> "AxisErrors":
-        """Return the sources with other figures of the class in place of its worst ones."""
+        """Return the sources with the likely or best figures of the class, not the worst."""
         model = {"in_use": None, "likely": self.likely, "best": self.best}[end]
         figures = {cause: figure.at(end) for cause, figure in self.figures.items()}
         return AxisErrors(model or self.model, figures)
 
     @property
     def noise(self) -> "AxisErrors":
-        """Its noise alone."""
+        """The same axis with only its noise."""
         return AxisErrors(self.model)
 
 
@@ -71,7 +72,7 @@ _NO_ERRORS = {"gyro": _NO_AXIS_ERRORS, "accel": _NO_AXIS_ERRORS}
 
 @dataclass(frozen=True)
 class Question:
-    """One error to be computed."""
+    """An error to be computed: which error, when, how it starts, and for which axis."""
 
     requirement: str | None  # name of the requirement; None for the standard times
     error: Error
@@ -86,23 +87,23 @@ class Question:
 
     @property
     def needs(self) -> tuple[Measured, ...]:
-        """Quantities that are needed to compute it."""
+        """Quantities, ``gyro`` and ``accel``, that the error depends on."""
         return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget for these axes."""
+        """Return the error budget with these axes of a gyro and an accelerometer."""
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).heading(self.time)
         return self._after(self.time, gyro, accel)
 
     def answer_all(self, gyro: AxisErrors, accel: AxisErrors) -> tuple[Budget, float, float, float]:
-        """Return the budget, and the totals of noise alone, likely, and best of the class."""
+        """Return the budget, and totals with only noise, and with likely and best class figures."""
         likely, best = (self.answer(gyro.at(end), accel.at(end)).total for end in _OTHER_ENDS)
         noise = self.answer(gyro.noise, accel.noise).total
         return self.answer(gyro, accel), noise, likely, best
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
-        """Return the time at which the limit is reached, s; for north, the static time needed."""
+        """Return the time, s, at which the limit is reached (north: time at rest), or None."""
         if self.limit is None:
             return None
         if self.error == "north":
@@ -110,10 +111,21 @@ class Question:
         lines = bool(gyro.model.sinusoids or accel.model.sinusoids)
         return time_until(self.limit, lambda time: self._after(time, gyro, accel), oscillates=lines)
 
+    @property
+    def confidence_in_plane(self) -> float | None:
+        """The confidence, if the error is a radius; None: it is along one axis."""
+        return self.confidence if self.error in ("velocity", "position") else None
+
     def _after(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget after a time of dead reckoning; in the plane with a confidence."""
+        """Return the budget after a time of dead reckoning."""
+        along = self.along_axis(time, gyro, accel)
+        radius = self.confidence_in_plane
+        return along if radius is None else along.to_radius(radius)
+
+    def along_axis(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
+        """Return the budget along one axis after a time of dead reckoning, s."""
         assert self.error != "north"
-        along = budget(
+        return budget(
             self.error,
             time,
             gyro=gyro.model,
@@ -123,9 +135,6 @@ class Question:
             gyro_figures=gyro.figures,
             accel_figures=accel.figures,
         )
-        if self.confidence is None or self.error not in ("velocity", "position"):
-            return along
-        return along.to_radius(self.confidence)
 
     def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
@@ -154,7 +163,7 @@ _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield the standard questions; times and window in s, the latitude for north in rad."""
+    """Yield every error at each time, for each axis; times and window in s, latitude in rad."""
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
     for axis in axes:
@@ -165,7 +174,7 @@ def list_standard_questions(
 
 
 def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[Question]:
-    """Yield the questions of a requirement."""
+    """Yield the error to compute for each limit of a requirement in dead reckoning."""
     latitude = requirement.latitude
     if requirement.static_window is not None:
         start = Start.calibrated(parse_quantity(requirement.static_window, "time"))
@@ -214,10 +223,10 @@ def list_error_rows(
 ) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
-    ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
-    ``draws`` the number of noise models that are drawn from each, for the interval of a total.
-    Each channel has its own random stream of the seed. ``figures`` belong to the errors in use,
-    by channel, and by quantity for a recording without it (`in_use.collect_figures_in_use`).
+    ``names`` has ``sensor`` and ``recording``. ``estimates`` has the recommended estimate of each
+    channel, from which ``draws`` noise models are drawn for the interval of a total. Each channel
+    has its own random stream of the seed. ``figures`` are errors other than noise, by channel, and
+    by quantity for a recording without the quantity (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
     without = {q: AxisErrors(figures=figures.get(q, in_use.NO_FIGURES)) for q in MEASURED}
@@ -225,6 +234,7 @@ def list_error_rows(
         channel: draw_axis_errors(channel, estimates[channel], errors.figures, draws, seed)
         for channel, errors in axes.items()
     }
+    variances = _draw_variances(lambda channel: [one.model for one in drawn[channel]])
     for question in questions:
         unit = SI_UNITS[DIMENSIONS[question.error]]
         asked = ErrorBudgetRow.taken_from(question, **names, source="total", unit=unit)
@@ -241,12 +251,17 @@ def list_error_rows(
                     )
             yield replace(asked, reasons=tuple(missing))
             continue
+        gyro, accel = chosen["gyro"], chosen["accel"]
         pair = [axes[c] if c else without[q] for q, c in chosen.items()]
         many = [drawn[c] if c else [without[q]] * draws for q, c in chosen.items()]
         nominal, noise, likely, best = question.answer_all(*pair)
-        budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
-        asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        totals = [each.total for each in budgets]
+        if question.error == "north":
+            each = zip(*many, strict=True)
+            totals = np.array([question.answer(*axes_drawn).total for axes_drawn in each])
+        else:
+            assert gyro is not None  # every error needs one
+            totals = _add_figures(variances(question, gyro, accel), question, pair, many)
+        asked = replace(asked, gyro=gyro, accel=accel)
         lower, upper = uncertainty.compute_limits(totals, nominal.total, _TAIL)
         used = [channel for channel in chosen.values() if channel]
         apart = [channel for channel in used if estimates[channel].draws is None]
@@ -273,7 +288,7 @@ def list_error_rows(
             likely=likely,
             best=best,
             drawn="one by one" if apart else "jointly",
-            within=question.limit and uncertainty.compute_chance_within(question.limit, budgets),
+            within=question.limit and uncertainty.compute_chance_within(question.limit, totals),
             reasons=reasons,
             reached_after=question.reached(*pair),
         )
@@ -288,13 +303,91 @@ def list_error_rows(
             )
 
 
+def _draw_variances(
+    models: Callable[[str], Sequence[NoiseModel]],
+) -> Callable[[Question, str, str | None], Array]:
+    """Return a function for the variance of an error from noise, for each drawn model of a channel.
+
+    Its arguments are a question, other than ``north``, and the channels of the gyro and of the
+    accelerometer; the result has the shape (draws,).
+    """
+
+    @cache
+    def stack(channel: str) -> tuple[int, list[tuple[NDArray[np.intp], Term]]]:
+        drawn = models(channel)
+        return len(drawn), list(stack_models(drawn))
+
+    @cache
+    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
+        return sum_over_stacked_terms(
+            *stack(channel), lambda term: np.asarray(term.growth(order, time, start))
+        )
+
+    def variance(question: Question, gyro: str, accel: str | None) -> Array:
+        error, time, start = question.error, question.time, question.start
+        assert error != "north"
+        factor = get_angle_factor(error, question.use)
+        total = factor**2 * grown(gyro, GYRO_ORDER[error], time, start.gyro)
+        if error in ACCEL_ORDER and accel:
+            total = total + grown(accel, ACCEL_ORDER[error], time, start.accel)
+        if error == "attitude" and accel and isinstance(start.accel, Calibrated):
+            window = start.accel.window
+            at_rest = grown(accel, 0, window, Uncalibrated(bias=0.0, on_time=0.0))
+            total = total + at_rest / (window * STANDARD_GRAVITY) ** 2
+        return total
+
+    return variance
+
+
+def _add_figures(
+    variance: Array,
+    question: Question,
+    pair: Sequence[AxisErrors],
+    drawn: Sequence[Sequence[AxisErrors]],
+) -> Array:
+    """Return the totals of an error with a variance from noise and drawn figures, shape (draws,).
+
+    ``pair`` and ``drawn`` are the sources, and draws of them, of the gyro and the accelerometer.
+    """
+    gyro, accel = (
+        AxisErrors(
+            figures={
+                cause: replace(figure, sigma=1.0) if figure.spread else figure
+                for cause, figure in axis.figures.items()
+            }
+        )
+        for axis in pair
+    )
+    sizes: dict[tuple[str | None, str], Array] = {
+        (quantity, cause): np.array([each.figures[cause].sigma for each in draws])
+        for quantity, axis, draws in zip(MEASURED, pair, drawn, strict=True)
+        for cause, figure in axis.figures.items()
+        if figure.spread
+    }
+    vectors: list[complex | NDArray[np.complexfloating]] = []
+    for part in question.along_axis(question.time, gyro, accel).contributions:
+        spread = part.figure is not None and part.figure.spread
+        size = sizes[part.source.quantity, part.source.source] if spread else np.ones(1)
+        if part.vector is None:
+            variance = variance + (part.sigma * size) ** 2
+        else:
+            vectors.append(part.vector * size)
+    both = sum((np.abs(vector) ** 2 for vector in vectors), np.zeros(1))
+    confidence = question.confidence_in_plane
+    if confidence is None:
+        return np.sqrt(variance + both)
+    factor = compute_radius_factor(variance, vectors, confidence)
+    return factor * np.sqrt(2.0 * variance + both)
+
+
 def find_largest_figures(
     nominal: Budget, limit: float | None, upper: float
 ) -> dict[ErrorSource, float]:
-    """Return the largest figures, SI, with which a limit is met, instead of limits of the class.
+    """Return the largest figures, SI, with which a limit is met, in place of class limits.
 
-    The figures that leave no room for others share the room equally; it is 0 if the other sources
-    exceed the limit, with the upper limit of the total, ``upper``, if that is below the limit.
+    The variance below the limit that other sources leave is divided equally; figures are 0 if none
+    is left. Sources that need less with their class limit are omitted. The other sources include
+    the uncertainty of the total, up to its limit ``upper``, unless they then exceed the limit.
     """
     parts = [
         part
@@ -322,7 +415,7 @@ def find_largest_figures(
 def collect_axis_errors(
     estimates: Mapping[str, Estimate], figures: Mapping[str, in_use.Figures]
 ) -> dict[str, AxisErrors]:
-    """Return the error sources of the axes with a noise model: the noise of others is not 0."""
+    """Return the error sources of axes with a noise model; axes with unknown noise are omitted."""
     return {
         channel: AxisErrors(estimate.model, figures.get(channel, in_use.NO_FIGURES))
         for channel, estimate in estimates.items()
@@ -343,7 +436,7 @@ def draw_axis_errors(
 def select_channels(
     question: Question, axes: Mapping[str, AxisErrors]
 ) -> dict[Measured, str | None] | None:
-    """Return the gyro and accelerometer channels to use; None if one of them is missing."""
+    """Return the channel of each quantity, the worst or the median axis; None if one is missing."""
     chosen: dict[Measured, str | None] = {"gyro": None, "accel": None}
     # Accelerometers level a gyro for north, if they are recorded.
     for quantity in MEASURED if question.error == "north" else question.needs:
@@ -406,36 +499,17 @@ def list_growth_rows(
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
-    They are for its worst axes, and if it has several, for each letter alone. ``times`` and
-    ``window``, s, are used in addition to the default times; the others are as in
+    They are for the worst axes, and for each of x, y and z if the recording has several. ``times``
+    and ``window``, s, are used in addition to the default times. The other arguments are as in
     `list_error_rows`.
     """
     axes = collect_axis_errors(estimates, figures)
 
-    @cache
-    def models(channel: str) -> tuple[int, list[tuple[NDArray[np.intp], Term]]]:
+    def draw(channel: str) -> list[NoiseModel]:
         stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
-        drawn = uncertainty.draw_models(estimates[channel], draws, stream)
-        return len(drawn), list(stack_models(drawn))  # once, and not for each question
+        return uncertainty.draw_models(estimates[channel], draws, stream)
 
-    @cache
-    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
-        return sum_over_stacked_terms(
-            *models(channel), lambda term: np.asarray(term.growth(order, time, start))
-        )
-
-    def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
-        """Return the variances of an error from noise, shape (draws,)."""
-        order = GYRO_ORDER[error]  # type: ignore[index]  # north is not asked for
-        gravity = STANDARD_GRAVITY if order else 1.0
-        total = gravity**2 * grown(gyro, order, time, start)
-        if error in ACCEL_ORDER and accel:
-            total = total + grown(accel, ACCEL_ORDER[error], time, start)
-        if error == "attitude" and accel:
-            at_rest = grown(accel, 0, start.window, Uncalibrated(bias=0.0, on_time=0.0))
-            total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
-        return total
-
+    variances = _draw_variances(draw)
     # The candidate channels for the worst axes, and for each axis alone.
     answerers = {"worst": axes}
     letters = sorted({channel[-1] for channel in axes})
@@ -453,7 +527,7 @@ def list_growth_rows(
             budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
             gyro, accel = chosen["gyro"], chosen["accel"]
             assert gyro is not None  # every error needs one
-            drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
+            drawn = variances(question, gyro, accel)
             row = partial(
                 ErrorGrowthRow,
                 sensor=names["sensor"],

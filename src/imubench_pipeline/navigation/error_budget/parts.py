@@ -8,6 +8,7 @@ from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from imubench_pipeline.model.states import Measured, SourcePath
@@ -32,8 +33,8 @@ class Contribution:
     source: ErrorSource
     sigma: float  # 1 sigma, rad, m/s or m
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
-    # error in the horizontal plane, the real part along the axis; None: along one axis, and alike
-    # along the other
+    # error in the horizontal plane, the real part along the axis; None: an error along the axis,
+    # and an independent one of the same size across it
     vector: complex | None = None
 
 
@@ -48,23 +49,19 @@ class Budget:
 
     @property
     def total(self) -> float:
-        """1 sigma: the root of the sum of the squares of the contributions."""
+        """The error, 1 sigma: the root of the sum of the squares of the contributions."""
         return math.hypot(*(contribution.sigma for contribution in self.contributions))
 
     def to_radius(self, confidence: float) -> "Budget":
         """Return the budget of the error in the plane, of velocity or position.
 
-        A contribution along one axis acts along the other too. The total is the radius within which
-        the error is with the probability ``confidence``, over the number of standard deviations of
-        an error along one axis with that probability.
+        A contribution along one axis acts along the other, too. The total is R / z. With the
+        probability ``confidence``, the error is within the radius R, and an error along one axis is
+        within z standard deviations.
         """
         along = math.fsum(part.sigma**2 for part in self.contributions if part.vector is None)
         vectors = [part.vector for part in self.contributions if part.vector is not None]
-        # The variances along the main axes are the mean plus and minus this.
-        mean = along + math.fsum(abs(vector) ** 2 for vector in vectors) / 2.0
-        apart = abs(sum(vector**2 for vector in vectors)) / 2.0
-        ratio = math.sqrt(max(mean - apart, 0.0) / (mean + apart)) if mean else 0.0
-        factor = float(np.interp(ratio, *tabulate_radii(confidence)))
+        factor = float(compute_radius_factor(along, vectors, confidence))
         return replace(
             self,
             contributions=[
@@ -77,6 +74,24 @@ class Budget:
         )
 
 
+def compute_radius_factor(
+    along: float | Array,
+    vectors: Sequence[complex | NDArray[np.complexfloating]],
+    confidence: float,
+) -> Array:
+    """Return the factor of `tabulate_radii` for a sum of independent errors, shape () or (draws,).
+
+    ``along`` is the variance, along each of two axes, of errors without a direction; ``vectors``
+    are errors with a direction.
+    """
+    # The variances along the main axes are the mean plus and minus this.
+    mean = along + sum(np.abs(vector) ** 2 for vector in vectors) / 2.0
+    apart = np.abs(sum(vector**2 for vector in vectors)) / 2.0
+    ratio = np.sqrt(np.maximum(mean - apart, 0.0) / np.maximum(mean + apart, _NO_VARIANCE))
+    return np.asarray(np.interp(ratio, *tabulate_radii(confidence)))
+
+
+_NO_VARIANCE = 1e-300  # divides 0 without an error
 _RADIUS_STEPS = 33
 _ANGLES = 4096
 
@@ -85,9 +100,9 @@ _ANGLES = 4096
 def tabulate_radii(confidence: float) -> tuple[Array, Array]:
     """Return ratios of the standard deviations along two axes, and factors for the radius.
 
-    A factor is the radius over z times the root of the sum of both variances, with the normal
-    quantile z. The probability within a radius R is the mean over the angle of
-    (1 - exp(-R^2 g / 2)) / (g s1 s2), with g = cos^2 / s1^2 + sin^2 / s2^2.
+    A factor is R / (z sqrt(s1^2 + s2^2)), with the standard deviations s1 and s2 and the two-sided
+    normal quantile z of ``confidence``. The probability within a radius R is the mean, over all
+    angles a, of (1 - exp(-R^2 g / 2)) / (g s1 s2), with g = cos(a)^2 / s1^2 + sin(a)^2 / s2^2.
     """
     ratios = np.linspace(0.0, 1.0, _RADIUS_STEPS)
     z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)

@@ -7,7 +7,6 @@ import numpy as np
 from scipy.special import ndtr
 
 from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter
-from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.typing import Array
 
@@ -15,19 +14,19 @@ from imubench_pipeline.typing import Array
 def compute_limits(
     drawn: Sequence[float] | Array, value: float, tail: float = 0.025
 ) -> tuple[float, float]:
-    """Return 95 % limits of draws, extended to the value: draws of an absent term exceed it."""
+    """Return 95 % limits of draws, extended to include ``value``, as drawn terms may exceed it."""
     lower, upper = np.quantile(drawn, [tail, 1.0 - tail]).tolist()
     return min(lower, value), max(upper, value)
 
 
-def compute_chance_within(limit: float, budgets: Sequence[Budget]) -> float:
-    """Return the probability that a total is within a limit, over budgets of drawn noise models.
+def compute_chance_within(limit: float, drawn: Array) -> float:
+    """Return the probability that a total is within a limit, from totals of drawn noise models.
 
     It is the integral of a kernel density estimate in log total, with a normal kernel (B. W.
     Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31), so that it is
     not 0 or 1 beyond the outermost draws. The limit, above 0, is in rad, m/s or m.
     """
-    totals = np.log(np.maximum([budget.total for budget in budgets], 1e-300))
+    totals = np.log(np.maximum(drawn, 1e-300))
     quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
     width = 0.9 * min(float(np.std(totals)), float(quarter)) * len(totals) ** -0.2
     left = math.log(limit) - totals
