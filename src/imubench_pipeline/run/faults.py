@@ -104,7 +104,7 @@ class Faults:
 
     def _records(self) -> "Iterator[tuple[Of, _Record]]":
         for path in sorted(self._folder.glob("*/**/*.json")):
-            with contextlib.suppress(OSError, ValueError):  # one that was cut off
+            with contextlib.suppress(OSError, ValueError):  # not completely written
                 record = _Record.model_validate(read_sealed_json(path))
                 yield (record.step, record.sensor, record.recording), record
 

@@ -42,7 +42,7 @@ _describe_end: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], describe: Callable[[str, str], str]) -> None:
-    """Print `describe(sensor, name)` once all `jobs` (listed by recording) of a recording ended."""
+    """Print `describe(sensor, name)` after the last job of a recording; `jobs`: one entry a job."""
     _expected.clear()
     _expected.update(jobs)
     _describe_end[:] = [describe]

@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
         "holes": dict.fromkeys(columns, False),
         "unusable": [],
     } | {"simulation": about}
-    # A name of its own in the stream: the same seed gives every sensor its own noise.
+    # The name is a part of the random stream: with one seed, each sensor has different noise.
     blocks = simulate_imu(
         origin.imu,
         rate,

@@ -22,7 +22,7 @@ from imubench_pipeline.words.findings.samples import TooShort
 
 
 def report_too_sparse(channel: str, log: ChannelLog) -> Finding:
-    """Return the finding that a channel has too few samples between its gaps for estimates."""
+    """Return the finding that a channel is too short, or has too many gaps, for estimates."""
     return find(TooShort(log.grid, rate=log.rate), "fatal", log.grid, channel)
 
 

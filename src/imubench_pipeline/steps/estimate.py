@@ -82,7 +82,7 @@ class Estimation:
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
     """By channel and method: the estimates in the tables ``parameters`` and ``draws``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
-    """Estimated temperature of each log file; its channels share the sensor of temperature."""
+    """Estimated temperature of each log file, which all channels of the file share."""
 
     def add_findings(self, key: Key, findings: Iterable[Finding]) -> None:
         """Add rows for the findings on a channel."""
@@ -198,7 +198,7 @@ class _Channel:
             )
             best = without.estimates[0]
             if "robust" in self.settings.methods:
-                # The effect that is fitted takes some of the noise with it.
+                # The fitted effect also contains some of the noise.
                 taken = warm.relative_error**2 * added.variance
                 whole = replace(left, variance=left.variance + taken)
                 best = self._fit_robustly(rest, whole, without)
@@ -206,7 +206,7 @@ class _Channel:
 
         limited = partial(add_fitted_limits, segments=log.segments, presence=self._presence)
         into.allan += rows.make_allan_rows(key, limited(self.curve, fitted))
-        if not self.signals.signals:  # else what they explain is taken out
+        if not self.signals.signals:  # removing these also removes slow noise
             white = fitted.estimates[0].parameters["N"].lower
             lack = find_missing_slow_noise(key.channel, fitted.spectrum, fitted.fitted, white)
             if lack is not None:

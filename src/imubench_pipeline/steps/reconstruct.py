@@ -117,7 +117,7 @@ def reconstruct_recording(
             results[estimate.method] = reconstruct(key, estimate, curve, rate, settings, series)
         recommended = results[best[channel].method].differences
         for method, result in results.items():
-            # Of the log without what temperature adds the curve is another.
+            # The compensated log has another curve, so that its RMS cannot be compared.
             same = method != "compensated" and result.differences.size and recommended.size
             chance = beats(result.differences, recommended) if same else None
             rows.scores.append(replace(result.score_row, beats=chance))
