@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 FOLDER = Path(__file__).with_name("extensions")
-"""The extensions; without this folder there are none."""
+"""Folder of the extensions; without it there are none."""
 
 T = TypeVar("T")
 
@@ -27,11 +27,11 @@ recording."""
 
 @dataclass(frozen=True)
 class Block:
-    """A block of settings: its location, and a reference to the class of its model."""
+    """A block of settings that an extension adds to one kind of file."""
 
     place: Place
-    key: str
-    model: str
+    key: str  # of the block in the file
+    model: str  # reference to its pydantic class
     description: str = ""
 
 
@@ -66,7 +66,7 @@ class Extension:
 
 @cache
 def installed_extensions() -> tuple[Extension, ...]:
-    """Return the installed extensions, in alphabetical order."""
+    """Return the installed extensions whose needs are installed too, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.ispkg)
     found: list[Extension] = [
         import_module(f"{__package__}.extensions.{name}").EXTENSION for name in names
@@ -79,7 +79,7 @@ File = Literal["rules", "templates", "static"]
 
 
 def files_of(what: File) -> list[Path]:
-    """Return the files, or folders, of one kind of all extensions."""
+    """Return the path of one kind of file or folder, in each extension that has it."""
     stated = ((one.name, getattr(one, what)) for one in installed_extensions())
     return [FOLDER / name / file for name, file in stated if file is not None]
 
@@ -90,8 +90,8 @@ class Hook(Generic[T]):
     Parameters
     ----------
     name : str
-        The field of `Extension`. The digest of the code of a step follows the references of the
-        hooks that its modules declare: `sources`.
+        A field of `Extension`. The digest of the code of a step includes the modules to which the
+        references of this field lead (`sources`).
     """
 
     def __init__(self, name: str) -> None:
@@ -102,12 +102,12 @@ class Hook(Generic[T]):
         return list(self.by_key().values())
 
     def by_key(self) -> dict[str, T]:
-        """Return the objects of all extensions by their keys, or by their references."""
+        """Return the objects of all extensions by key; without a key, by reference."""
         return {key: load(reference) for key, reference in references(self._name).items()}
 
 
 def references(hook: str) -> dict[str, str]:
-    """Return the references of all extensions for a hook, by their keys."""
+    """Return the references of all extensions for a hook, by key; without a key, by themselves."""
     found: dict[str, str] = {}
     for extension in installed_extensions():
         stated = getattr(extension, hook)
@@ -119,23 +119,26 @@ def references(hook: str) -> dict[str, str]:
 
 
 def blocks(place: Place) -> dict[str, Block]:
-    """Return the blocks of settings of all extensions in files of one kind, by their keys."""
+    """Return the blocks of settings that extensions add to one kind of file, by key."""
     every = (block for extension in installed_extensions() for block in extension.blocks)
     return {block.key: block for block in every if block.place == place}
 
 
 def load(reference: str) -> Any:
-    """Return the object of a reference, or the module if it names no object."""
+    """Import the object that a reference names, or its module if it names no object."""
     module, _, name = reference.partition(":")
     loaded = import_module(f"{__package__}.extensions.{module}")
     return getattr(loaded, name) if name else loaded
 
 
 def find_function(name: str) -> Any:
-    """Return the function of the library that an extension adds; ImportError without it."""
+    """Return a library function that an extension adds; raise ImportError if none adds it."""
     added = references("library")
     if name not in added:
-        raise ImportError(f"{__package__}: no extension has {name}; expected all of extensions/")
+        raise ImportError(
+            f"{__package__}.{name} belongs to an extension that is not installed; reinstall the "
+            "package with all folders of extensions/"
+        )
     return load(added[name])
 
 
@@ -145,9 +148,9 @@ def sources(of: str, name: str) -> list[Path]:
     Parameters
     ----------
     of : str
-        How it asks: ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``.
+        The call in the module: ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``.
     name : str
-        With which name.
+        The argument of this call.
     """
     used = installed_extensions()
     if of == "files_of":
