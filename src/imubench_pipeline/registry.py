@@ -87,11 +87,8 @@ def files_of(what: File) -> list[Path]:
 class Hook(Generic[T]):
     """A hook of the core, to which extensions add objects of one type.
 
-    Parameters
-    ----------
-    name : str
-        A field of `Extension`. The digest of the code of a step includes the modules to which the
-        references of this field lead (`sources`).
+    ``name`` is a field of `Extension`. A digest of the code of a step includes the modules to which
+    the references in this field lead (`sources`).
     """
 
     def __init__(self, name: str) -> None:
@@ -145,12 +142,8 @@ def find_function(name: str) -> Any:
 def sources(of: str, name: str) -> list[Path]:
     """Return the files of extensions that a module loads through the registry.
 
-    Parameters
-    ----------
-    of : str
-        The call in the module: ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``.
-    name : str
-        The argument of this call.
+    ``of`` is the call in the module, ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``;
+    ``name`` is the argument of this call.
     """
     used = installed_extensions()
     if of == "files_of":

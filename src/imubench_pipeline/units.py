@@ -404,21 +404,9 @@ def convert(value: Any, unit: str, to: str) -> Any:
 def parse_setting(value: float | str, dimension: str, name: str) -> float:
     """Return a setting in SI, above 0, from a number in SI or from a text with its unit.
 
-    Parameters
-    ----------
-    value : float or str
-        Such as 100.0 or ``100 Hz``.
-    dimension : str
-        A key of `SI_UNITS`.
-    name : str
-        Name of the setting, for the error.
-
-    Raises
-    ------
-    UnitError
-        If a text is not a number with a unit of this dimension.
-    ValueError
-        If the value is neither a number nor a text, or is not above 0 and finite.
+    ``value`` is, for instance, 100.0 or ``100 Hz``; ``dimension`` is a key of `SI_UNITS`; ``name``
+    is the name of the setting, for errors. Raises a `UnitError` if a text is not a number with a
+    unit of this dimension, and a ValueError if the value is not a finite number above 0.
     """
     if isinstance(value, str):
         with add_key_to_errors(f"{name}: "):

@@ -275,7 +275,6 @@ def of_phase(
 def _check_arguments(
     rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[Span]
 ) -> NDArray[np.int64]:
-    """Check the common arguments, and return the sizes."""
     if not rate > 0:
         raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")
     reached = 0

@@ -59,7 +59,7 @@ _QUANTIZATION_MODELS = (Terms("QN"), Terms("QNFK", 1))
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The low-pass filter in a spectrum."""
+    """The low-pass filter that a spectrum shows, if any."""
 
     frequency: Parameter  # f_c (-3 dB), Hz
     kind: Kind | None = None  # None without a filter

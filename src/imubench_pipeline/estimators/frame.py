@@ -66,7 +66,7 @@ class FitSelection:
         return self.low_pass.gain if self.low_pass is not None else None
 
     def whittle(self, spectrum: Spectrum, *, all_bins: bool = False) -> Whittle:
-        """Return the likelihood of the bins that are fitted, or roughly of all."""
+        """Return the likelihood of the fitted bins, or an approximate one of all bins."""
         if not all_bins:
             spectrum = spectrum.select(self.used)
         samples = _MIN_CORRELATION_SAMPLES if self.gain is None else MIN_PROCESS_SAMPLES
@@ -94,7 +94,7 @@ def select_for_fit(
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
     ``line_spectra`` are as in `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
-    is the highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
+    is the highest frequency to use, Hz, by default as far as the low-pass filter does not matter;
     ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
     step of the register, SI, or 0.
     """

@@ -48,7 +48,7 @@ _MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at e
 
 
 class UnfitCurveError(ValueError):
-    """An Allan variance to which no model can be fitted; the text says why."""
+    """An Allan variance to which no model can be fitted; the message states the reason."""
 
 
 def fit(
@@ -75,7 +75,7 @@ def fit(
     ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the search, which
     goes as far as the process still peaks inside the tau used; ``not_identified``: the log cannot
     determine the value (`add_limits`). Raises UnfitCurveError if fewer than four points lie within
-    ``longest``, or the Allan variance is 0 at one; ValueError if the method is not known.
+    ``longest``, or a variance is 0; ValueError if the method is not known.
     """
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _MIN_POINTS:

@@ -71,14 +71,14 @@ class Line:
 
     @property
     def term(self) -> Sinusoid:
-        """The noise term."""
+        """The line as a term of a noise model."""
         return Sinusoid(self.amplitude, self.frequency)
 
 
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the lines by frequency; block means serve up to ``crossover``, Hz, samples above."""
+    """Return the lines by frequency: up to ``crossover``, Hz, from block means, then samples."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0
@@ -170,7 +170,6 @@ def _estimate_line(
     group: NDArray[np.int64],
     rate: float,
 ) -> Line:
-    """Return the line of a group of significant bins."""
     step = float(spectrum.frequency[1])
     n = spectrum.segments
     peak = int(group[np.argmax(standing[group])])

@@ -41,7 +41,7 @@ def count_fast_processes(maximum: Maximum, rate: float) -> int:
 
 
 def merge_fast_processes(maximum: Maximum, number: int) -> Maximum:
-    """Return a fit whose ``number`` fastest processes are part of its white noise."""
+    """Return a fit with its ``number`` fastest processes merged into the white noise."""
     if not number:
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()
@@ -56,10 +56,10 @@ def merge_fast_processes(maximum: Maximum, number: int) -> Maximum:
 
 
 def merge_fast_draws(posterior: Posterior, terms: Terms, number: int) -> Posterior:
-    """Return draws of a model whose ``number`` fastest processes are part of its white noise.
+    """Return draws of a model with its ``number`` fastest processes merged into white noise.
 
-    The processes of a draw are in the order of T_B: where one is merged, all faster than a second
-    are, as a weak process may be faster than the strong one.
+    All processes of a draw that are faster than a second are merged too: a draw has them in the
+    order of T_B, and a weak process may be faster than the strong one.
     """
     if not number:
         return posterior

@@ -67,7 +67,6 @@ def _find_degrees(
     presence: Presence | None,
     share: float,
 ) -> tuple[float, float]:
-    """Return both degrees of freedom at a cluster size."""
     terms = np.array([stop - start - 2 * n + 1 for start, stop in spans])
     terms = terms[terms > 0]
     if not len(terms) or not share > 0:

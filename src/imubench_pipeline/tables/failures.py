@@ -104,8 +104,9 @@ def mark_failures(
 ) -> dict[str, pa.Table]:
     """Return tables in which failures are listed and failed recordings have no results.
 
-    A recording with a failed step gets the status ``failed`` and a finding; its rows in other
-    tables are removed. A static recording keeps both if the step needs more than a static log.
+    A recording with a failed step gets a finding and the status ``failed``; its rows in other
+    tables are removed. A static recording keeps its status and rows if the failed step needs more
+    than a static log.
     """
     if not failures:
         return {"failures": files.make_schema("failures").empty_table()} | dict(tables)

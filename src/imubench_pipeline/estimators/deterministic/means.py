@@ -62,7 +62,7 @@ class Means:
 def average_blocks(
     blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
-    """Return the block means of a log in consecutive blocks, SI, NaN where a sample is missing."""
+    """Return the block means of a log, given in parts in order, SI, NaN for missing samples."""
     spans = list_spans(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MAX_BLOCKS), min(_MIN_BLOCK_SAMPLES, max(total // _MIN_BLOCKS, 1)))
@@ -159,7 +159,7 @@ class Stationarity:
 
 
 def assess_stationarity(means: Means) -> Stationarity | None:
-    """Return the change of the fast noise over the longest part; None if short or constant."""
+    """Return how fast noise changes along the longest part; None if it is short or constant."""
     part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _MIN_SECTION_BLOCKS or means.block < 2:

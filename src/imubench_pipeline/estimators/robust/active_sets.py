@@ -46,7 +46,10 @@ class Solutions:
 
 
 class TermSearch:
-    """Search for the best set of terms at tau, averaged, (m,), and times, (t,), s; rate in Hz."""
+    """Searches for the best set of noise terms of Allan variances at ``tau``, s, shape (m,).
+
+    ``averaged``, (m,), are samples per cluster; ``times``, (t,), the T_B to try, s; rate in Hz.
+    """
 
     def __init__(self, tau: Array, rate: float, averaged: Array, times: Array) -> None:
         self.times = times
@@ -71,7 +74,7 @@ class TermSearch:
         return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
 
     def exclude(self, term: int) -> "TermSearch":
-        """Return the search among the sets without a term."""
+        """Return a search among the sets that do not contain a term."""
         search = copy(self)
         search._gains = np.where(self._masks[:, term], np.inf, self._gains)
         return search

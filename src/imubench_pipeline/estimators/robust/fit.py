@@ -105,7 +105,7 @@ def fit(
     ``lines`` are spectral lines. Returns SI values with 95 % limits: sampling, choice of
     terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
     upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
-    than six points lie within a sixth of the log, or the variance is 0 at one.
+    than six points lie within a sixth of the log, or a variance is 0.
     """
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))

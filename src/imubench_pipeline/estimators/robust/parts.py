@@ -32,23 +32,17 @@ _SIGNIFICANCE = 0.95  # Of an excess that counts
 
 @dataclass(frozen=True)
 class PartVariances:
-    """Allan variances of equal parts of a log at the cluster sizes of its curve.
+    """Allan variances of equal parts of a log at the cluster sizes of its curve."""
 
-    Attributes
-    ----------
-    squares, terms : ndarray, shape (PARTS, m)
-        Sums of squared differences of cluster means, and their number; 0 where a part is too short.
-    """
-
-    squares: Array
-    terms: Array
+    squares: Array  # (PARTS, m): sums of squared differences of cluster means
+    terms: Array  # (PARTS, m): number of these differences; 0 where a part is too short
 
     def select(self, points: NDArray[np.bool_]) -> "PartVariances":
-        """Return those at some points of the curve."""
+        """Return the sums at the points of a mask, shape (m,)."""
         return PartVariances(self.squares[:, points], self.terms[:, points])
 
     def divide(self, number: int) -> Array:
-        """Return the variances of a number of equal parts, shape (number, m); NaN where unknown."""
+        """Return the variances of 1, 2, 3 or 6 equal parts, shape (number, m); NaN if unknown."""
         squares, terms = (
             sums.reshape(number, PARTS // number, -1).sum(axis=1)
             for sums in (self.squares, self.terms)

@@ -47,7 +47,7 @@ class Readings:
 
 
 def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
-    """Return block means of readings, °C, NaN where missing; raises ValueError if all are."""
+    """Return readings, °C, NaN where missing, averaged in blocks; ValueError if none is present."""
     width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
     begins = [np.arange(start, stop, width) for start, stop in segments]
     begin = np.concatenate(begins)
@@ -68,7 +68,7 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
             levels = np.union1d(levels, chosen)
     present = int(count.sum())
     if present == 0:
-        raise ValueError("no temperature is present")
+        raise ValueError("the log has no reading of the temperature, expected one or more")
     for first, last in pairwise(np.cumsum([0, *(len(part) for part in begins)])):
         if not count[first:last].any():  # a segment without readings has no effect
             total[first], count[first] = total.sum() / present, 1
@@ -173,7 +173,7 @@ class TemperaturePath:
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return means over ``count`` blocks from a first sample, of values at the knots, (k,)."""
+        """Return means, (count,), over blocks from a first sample, of values at knots, (k,)."""
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
         # The integral from the first edge; flat beyond the first and the last knot.
