@@ -172,7 +172,7 @@ def test_sealed_json_deeper_than_python_reads_is_refused(tmp_path: Path) -> None
     text = '{\n "a": ' + "[" * 100_000 + "]" * 100_000
     digest = hashlib.sha256(f"{text}\n}}".encode()).hexdigest()
     (tmp_path / "a.json").write_text(f'{text},\n "digest": "{digest}"\n}}\n')
-    with pytest.raises(ValueError, match="is nested deeper than permitted"):
+    with pytest.raises(ValueError, match="is nested too deeply"):
         read_sealed_json(tmp_path / "a.json")
 
 

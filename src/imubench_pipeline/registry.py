@@ -99,12 +99,12 @@ class Hook(Generic[T]):
         return list(self.by_key().values())
 
     def by_key(self) -> dict[str, T]:
-        """Return the objects of all extensions by key; without a key, by reference."""
+        """Return the objects of all extensions by key; the default key is the reference."""
         return {key: load(reference) for key, reference in references(self._name).items()}
 
 
 def references(hook: str) -> dict[str, str]:
-    """Return the references of all extensions for a hook, by key; without a key, by themselves."""
+    """Return the references of all extensions for a hook by key, by default the reference."""
     found: dict[str, str] = {}
     for extension in installed_extensions():
         stated = getattr(extension, hook)

@@ -188,7 +188,7 @@ def _parsed(unit: str) -> "tuple[float, pint.Unit]":
     if _LOST_SIGN.search(unit):
         raise UnitError(f"{unit!r} has lost a sign, such as √ or µ; state the intended unit")
     if len(unit) > _LONGEST:
-        raise UnitError(f"{unit[:_LONGEST]!r}... is longer than a unit of {_LONGEST} characters")
+        raise UnitError(f"{unit[:_LONGEST]!r}... has over {_LONGEST} characters; a unit is shorter")
     power = _POWER_OF_TWO.search(unit)
     text = _normalise(unit[: power.start()] if power else unit)
     if power and abs(int(power[1])) > _HIGHEST_POWER_OF_TWO:
@@ -296,7 +296,7 @@ def _targets() -> "dict[str, pint.Unit]":
 
 @lru_cache(maxsize=1024)
 def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
-    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
+    """Return the factor and offset that convert a unit to SI: ``si = factor * value + offset``.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def test_a_term_without_a_part_cannot_be_made_nor_registered() -> None:
         (
             (WhiteNoise, changed(WhiteNoise, symbol="M", word="M", parameters=(
                 TermParameter("N", "", 1.0, -0.5),))),
-            "N of OtherWhiteNoise is another term's symbol",
+            "N of OtherWhiteNoise is not N of another term",
         ),
     ],
 )  # fmt: skip

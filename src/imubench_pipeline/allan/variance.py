@@ -166,7 +166,7 @@ def allan_variance(
     """
     values = np.asarray(samples, dtype=np.float64)
     if values.ndim != 1 or len(values) < 2:
-        raise ValueError(f"samples have shape {values.shape}, expected one dimension, 2 or more")
+        raise ValueError(f"samples have shape {values.shape}, expected one dimension of size >= 2")
     if overlap not in ("full", "octave"):
         raise ValueError(f"overlap {overlap!r} is not known, expected 'full' or 'octave'")
     if valid is not None:

@@ -59,7 +59,7 @@ def _doubt_group(
 
 
 def yield_disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield a finding for each parameter whose two best estimates are ok and exclude each other."""
+    """Yield a finding for each parameter whose robust and likelihood estimates disagree."""
     if not {"robust", "likelihood"} <= estimates.keys():
         return
     for symbol in ("N", "B_curve", "K"):

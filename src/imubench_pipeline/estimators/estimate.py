@@ -207,6 +207,6 @@ def _checked(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
 
 
 def not_shown(method: str, reason: str) -> Estimate:
-    """Return the estimate of the papers' model where the log shows none of its parameters."""
+    """Return an estimate in which N, B, T_B, K and the curve are ``not_shown``, with a reason."""
     nothing = Parameter(None, "not_shown", reason)
     return Estimate(method, dict.fromkeys(PARAMETERS, nothing), curve=dict.fromkeys(CURVE, nothing))

@@ -78,7 +78,7 @@ class Line:
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the lines by frequency: up to ``crossover``, Hz, from block means, then samples."""
+    """Return the lines by frequency; block means show lines up to ``crossover``, Hz."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0
@@ -225,7 +225,7 @@ def _is_above_neighbours(spectrum: LineSpectrum, peak: int) -> bool:
 
 
 def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
-    """Return the bins without leakage from lines, given the fitted density, shape (b,)."""
+    """Return a mask of the bins without leakage from lines, given the fitted density, (b,)."""
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _MAX_LINE_LEAKAGE * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
     for line in lines:

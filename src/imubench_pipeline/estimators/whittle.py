@@ -157,7 +157,7 @@ class Terms:
 
     @property
     def biases(self) -> tuple[bool, int]:
-        """Whether it has flicker noise, and how many Gauss-Markov processes."""
+        """Whether the model has flicker noise, and how many Gauss-Markov processes."""
         return "F" in self.linear, self.gauss_markov
 
     @property

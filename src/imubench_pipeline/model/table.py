@@ -86,7 +86,7 @@ class TypedColumn:
 
     @property
     def is_list(self) -> bool:
-        """Whether a value is a list."""
+        """Whether the values are lists."""
         return bool(pa.types.is_list(self.type))
 
     def read(self, content: pa.ChunkedArray) -> list[Any]:
@@ -154,7 +154,7 @@ class TableRow(_Attributes):
 
     @classmethod
     def taken_from(cls, source: object, /, **columns: object) -> Self:
-        """Return a row of ``columns``, and of the attributes of ``source`` with other names."""
+        """Return a row with ``columns``; the other columns are attributes of ``source``."""
         names = [name for name in names_of(cls) if hasattr(source, name)]
         return cls(**{**{name: getattr(source, name) for name in names}, **columns})
 

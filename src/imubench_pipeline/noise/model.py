@@ -33,8 +33,8 @@ class NoiseModel:
     N : float
         White noise density, rad/s/sqrt(Hz) or m/s^2/sqrt(Hz).
     B, T_B : float
-        Bias instability, rad/s or m/s^2. With a correlation time, s, it is the Gauss-Markov
-        process of the papers; without one it is flicker noise, as IEEE Std 952 has it.
+        Bias instability, rad/s or m/s^2. With a correlation time T_B, s, it is the Gauss-Markov
+        process of Maia et al.; without T_B it is flicker noise, as in IEEE Std 952.
     K : float
         Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s).
     R : float

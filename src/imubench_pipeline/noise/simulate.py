@@ -177,7 +177,7 @@ def _sum_variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
 def block_sums(
     model: NoiseModel, rate: float, blocks: int, width: int, rng: np.random.Generator
 ) -> Array:
-    """Draw the sums of a log over adjacent blocks of ``width`` samples, exactly, (blocks,)."""
+    """Draw the sums of a log over blocks of ``width`` samples, exact in distribution, (blocks,)."""
     interval = 1.0 / rate
     sums = np.zeros(blocks)
     for term in model.realised(interval, max(blocks * width, 2) * interval):

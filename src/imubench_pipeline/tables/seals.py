@@ -41,7 +41,7 @@ def read_sealed_json(path: Path) -> JsonObject:
     try:
         data: JsonObject = json.loads(rest)
     except RecursionError:
-        raise ValueError(f"{path}: is nested deeper than permitted") from None
+        raise ValueError(f"{path}: its content is nested too deeply to be read") from None
     return data
 
 
@@ -113,7 +113,7 @@ class SealedFile:
 
 @dataclass(frozen=True)
 class Seal:
-    """The inputs and outputs of a step."""
+    """Digests of the inputs and outputs of a step, with its settings and version."""
 
     place: str  # from `name_place`
     form: str  # as `compute_form_digest` gave it

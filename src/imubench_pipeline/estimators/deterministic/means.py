@@ -159,7 +159,7 @@ class Stationarity:
 
 
 def assess_stationarity(means: Means) -> Stationarity | None:
-    """Return how fast noise changes along the longest part; None if it is short or constant."""
+    """Return the trend of the fast noise over the longest part; None if it cannot be tested."""
     part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _MIN_SECTION_BLOCKS or means.block < 2:

@@ -102,10 +102,10 @@ def fit(
     """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
 
     ``curve`` and ``parts`` have the same m points, SI and s, without deterministic signals;
-    ``lines`` are spectral lines. Returns SI values with 95 % limits: sampling, choice of
-    terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
-    upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
-    than six points lie within a sixth of the log, or a variance is 0.
+    ``lines`` are spectral lines. The values are in SI; their 95 % limits include sampling, choice
+    of terms, error of the model, and changes of the sensor within the log. A term that may be
+    absent, or has too wide limits, is ``not_identified``, with an upper limit. Raises
+    UnfitCurveError if fewer than six points lie within a sixth of the log, or a variance is 0.
     """
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))

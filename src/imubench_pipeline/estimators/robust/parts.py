@@ -88,8 +88,8 @@ def estimate_excess(
     """Return the variance of the logarithm of a parameter between parts, beyond sampling errors.
 
     ``influence``, shape (m,), are the derivatives of the logarithm of the parameter by the
-    logarithms of the variances; ``covariance`` returns the covariance of the relative variances of
-    a log of a number of samples.
+    logarithms of the variances; ``covariance`` returns, for a number of samples, the covariance of
+    the relative variances of a log of this length.
     """
     excesses = []
     for number in _DIVISIONS:

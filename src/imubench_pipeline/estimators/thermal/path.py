@@ -92,7 +92,7 @@ def estimate_resolution(levels: Array, present: int) -> float:
     """Return the least significant bit of a register from its distinct readings, °C; 0: unknown.
 
     It is the smallest gap between the levels, shape (n,), ascending, if all gaps are multiples of
-    it within decimal rounding, and enough of the readings ``present`` are repeated.
+    it within decimal rounding, and the ``present`` readings repeat each level often enough.
     """
     if len(levels) < 2 or present < _MIN_READINGS_PER_LEVEL * len(levels):
         return 0.0

@@ -147,7 +147,7 @@ class Term(ABC):
 
     @abstractmethod
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Allan variance of the sampled process at n samples a cluster, SI^2."""
+        """Allan variance of the sampled process at n samples per cluster, SI^2."""
 
     @abstractmethod
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
@@ -358,5 +358,6 @@ def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     for kind in kinds:
         for parameter in kind.parameters:
             if parameters.setdefault(parameter.symbol, parameter) != parameter:
-                raise TypeError(f"{parameter.symbol} of {kind.__name__} is another term's symbol")
+                symbol, name = parameter.symbol, kind.__name__
+                raise TypeError(f"{symbol} of {name} is not {symbol} of another term; rename it")
     return kinds

@@ -163,7 +163,7 @@ def fit_flicker_bank(B: float, interval: float, longest: float) -> list[Term]:
     ``interval`` to ``longest``, s; ValueError if it is empty.
     """
     if not 0 < interval < longest:
-        raise ValueError(f"the band of tau is {interval} to {longest} s, expected a rising one")
+        raise ValueError(f"tau is {interval} to {longest} s, expected 0 < interval < longest")
     times, levels, white = _fit_unit_bank(round(math.log10(longest / interval), 6))
     terms: list[Term] = [
         gauss_markov.GaussMarkov(B * level, interval * time)

@@ -62,14 +62,14 @@ class Sinusoid(Deterministic):
         return ContinuousSpace(F, np.zeros((2, 2)), np.array([1.0, 0.0]))
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
-        """Draw the phase at random, for the amplitude of the line."""
+        """Draw the initial state: a random phase, with the amplitude of the line."""
         phase = rng.uniform(0.0, 2.0 * math.pi)
         return self.amplitude * np.array([math.cos(phase), math.sin(phase)])
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """Return A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with w = 2 pi f_0.
 
-        The phase is random. Uncalibrated, the term phi_1(-i w W) is absent.
+        A is the amplitude; the phase is random. Uncalibrated, phi_1(-i w W) is absent.
         """
         omega = 2.0 * math.pi * self.frequency
         constant, x = of_constant(order, time), omega * time
@@ -88,7 +88,7 @@ class Sinusoid(Deterministic):
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
         """Return A^2 / 2 times the gains of both blocks and the cosine of their phase difference.
 
-        A gain is sin(n w T/2) / (n sin(w T/2)); the phase at the start is not known.
+        A is the amplitude, w = 2 pi f_0, and a gain sin(n w T/2) / (n sin(w T/2)).
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         half = math.pi * self.frequency * (1.0 / blocks.rate)
