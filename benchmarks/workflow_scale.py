@@ -1,8 +1,9 @@
 """The workflow with many recordings: what it costs beside the computation, and what is fast.
 
-python benchmarks/workflow_scale.py [--recordings 1000] [--folder DIR]
+python benchmarks/workflow_scale.py [--recordings 1000] [--at-once N] [--gyro] [--folder DIR]
 
-Short logs of one sensor model each, analysed by `weighted` alone so that they take little time. The
+Short logs of one sensor model each, analysed by `weighted` alone so that they take little time,
+with ``--gyro`` of one gyro axis only. At most ``--at-once`` recordings are new in a run. The
 overhead of a recording is the CPU time of the whole run, less the steps for all recordings, less
 what the steps of a recording compute where everything is imported and compiled already.
 """
@@ -57,8 +58,9 @@ class Costs:
 class Lab:
     """Logs and sensor files in a folder, and the results of runs."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, channels: Sequence[str]) -> None:
         self.folder = folder
+        self.channels = channels
         self.costs = folder / "costs"
         self.settings = {
             "logs": str(folder / "logs"),
@@ -73,7 +75,7 @@ class Lab:
         for number in range(SENSORS):
             path = self.folder / f"sensors/sensor_{number:02d}.yaml"
             path.parent.mkdir(parents=True, exist_ok=True)
-            log = {"rate": "100 Hz", "channels": CHANNELS}
+            log = {"rate": "100 Hz", "channels": {name: CHANNELS[name] for name in self.channels}}
             datasheet = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
             about = {"vendor": "Benchmark", "model": path.stem, "log": log, "datasheet": datasheet}
             path.write_text(yaml.safe_dump(about))
@@ -195,7 +197,7 @@ def _peak() -> float:
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e6  # KiB
 
 
-def measure(lab: Lab, recordings: int) -> None:
+def measure(lab: Lab, recordings: int, at_once: int) -> None:
     """Make the logs, run, and print what each run takes."""
     lab.put_sensors()
     lab.put_log(0)
@@ -203,14 +205,15 @@ def measure(lab: Lab, recordings: int) -> None:
     lab.taken()
     print(f"{'recordings':>10} {'s':>7} {'CPU s':>7}  steps for all recordings: CPU s (peak MB)")
     done = 1
-    for part in (recordings // 4, recordings // 2, recordings):
+    for part in sorted({*range(at_once, recordings, at_once), recordings}):
         for number in range(done, part):
             lab.put_log(number)
         taken, cpu, peak = lab.run()
         costs = lab.taken()
         shared = {step: cpu for step, cpu in costs.cpu.items() if step not in OF_A_RECORDING}
         shown = ", ".join(f"{s} {sum(c):.1f} ({costs.memory[s]:.0f})" for s, c in shared.items())
-        print(f"{part:>10} {taken:>7.0f} {cpu:>7.0f}  {shown}; any process {peak:.0f} MB")
+        figures = f"{part:>10} {taken:>7.0f} {cpu:>7.0f}  {shown}; any process {peak:.0f} MB"
+        print(figures, flush=True)
         cost = (cpu - sum(map(sum, shared.values()))) / (part - done)
         done = part
     computed = lab.computation(range(0, recordings, max(recordings // COMPUTED, 1)))
@@ -231,12 +234,15 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=1000)
+    parser.add_argument("--at-once", type=int, default=500)
+    parser.add_argument("--gyro", action="store_true", help="logs of one gyro axis only")
     parser.add_argument("--folder", type=Path, help="where to work; default: a temporary folder")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
-        measure(Lab(folder), given.recordings)
+        channels = ("gyro_x",) if given.gyro else tuple(CHANNELS)
+        measure(Lab(folder, channels), given.recordings, given.at_once)
 
 
 if __name__ == "__main__":

@@ -152,7 +152,7 @@ def test_a_parameter_that_is_not_known_leaves_no_number_where_it_matters() -> No
     assert short["n"] == pytest.approx(9.0, rel=1e-3) and not short["reasons"]
     long = rows_of(candidate("a", vague), other, tau=1000.0)["a", "b"]
     assert long["n"] is None
-    assert "; ".join(long["reasons"]) == "K of a/r gyro x is not determined"
+    assert "; ".join(long["reasons"]) == "in recording a/r, K of gyro x is not determined"
     assert long["upper"] > 1.5 * long["lower"] > 9.0
 
 
@@ -161,7 +161,7 @@ def test_an_unknown_correlation_time_is_a_matter_of_its_process() -> None:
     other = candidate("b", known(N=1e-4))
     assert rows_of(candidate("a", vague), other, tau=1.0)["a", "b"]["n"] is not None
     row = rows_of(candidate("a", vague), other, tau=100.0)["a", "b"]
-    assert "; ".join(row["reasons"]) == "T_B of a/r gyro x is bounded"
+    assert "; ".join(row["reasons"]) == "in recording a/r, T_B of gyro x is bounded"
 
 
 def test_the_median_measured_channel_answers() -> None:

@@ -37,7 +37,7 @@ def test_the_ratio_of_two_logs_is_in_its_interval(comparison) -> None:
         truth = math.sqrt(GYRO.allan_variance(tau) / LOUD.allan_variance(tau))
         assert ratio.lower < truth < ratio.upper
         if ratio.value is None:  # a part below its limit may matter: the reason names it
-            assert ratio.reasons == ("B of sensor_1/run gyro x is not determined",)
+            assert ratio.reasons == ("in recording sensor_1/run, B of gyro x is not determined",)
         else:
             assert ratio.lower <= ratio.value <= ratio.upper
     assert "σ(3600 s)" not in rows  # beyond a ninth of the logs

@@ -132,7 +132,7 @@ def test_noise_that_decides_is_for_a_log() -> None:
     ends = [heading(N, B, walk_of(B, time)) for time in WALK_TIMES]
     (row,) = judged(sensor(**NOISE), requirement(math.sqrt(ends[0] * ends[2])))
     assert (row["verdict"], row["conditions"]) == ("not_enough_data", [])
-    assert row["reasons"] == ["a part of its noise is not printed, so a log decides"]
+    assert row["reasons"] == ["its datasheet does not print all noise parameters: a log is needed"]
     # It is ranked among those that fail.
     assert row["rank"] == 1
 

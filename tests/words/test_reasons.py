@@ -111,7 +111,7 @@ POOLS = [
     of(pools.level_changed, "below", 15, above=False),
     of(pools.operand_status, "the first value is not determined", "first", "not_identified"),
     of(pools.tau_beyond, "τ up to 400 s", 400.0),
-    of(pools.undetermined, "K of s/r gyro x is", "K", "s/r", "gyro_x", "not_identified"),
+    of(pools.undetermined, "in recording s/r, K of gyro x is", "K", "s/r", "gyro_x", "not_identified"),
     of(pools.short_for_windows, "3 consecutive windows of 120 s", 3, 120.0, 360.0, 300.0),
     of(pools.gaps_between_windows, "5 overlapping windows", 5, 3, 120.0, 360.0),
     of(pools.long_sampling_interval, "0.1 Hz", 0.1),

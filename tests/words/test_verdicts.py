@@ -106,12 +106,12 @@ def test_every_unknown_figure_has_words_and_a_unit(figure: Cause, quantity: str)
         (
             Condition("g_sensitivity", None, "gyro", 0.1001 * DEGREE / 9.80665, 3, 21),
             "its gyro g-sensitivity is below 0.1 deg/s/g "
-            "(1σ; 3 of 21 datasheets print such a value)",
+            "(1σ; met by 3 of 21 datasheets that print it)",
         ),
         (
             replace(SCALE, within=1, printing=1),
             "its gyro scale factor error is below 1200 ppm "
-            "(1σ; 1 of 1 datasheet prints such a value)",
+            "(1σ; met by 1 of 1 datasheet that prints it)",
         ),
         (MASS, "its mass meets the requirement"),
         (Condition(None, "axis", "gyro_x"), "it has a gyro x axis"),
@@ -134,7 +134,7 @@ def test_every_property_has_words(of: Property) -> None:
     assert is_plain(shortfall_text(without))
     if of not in ("quantity", "axis"):
         assert shortfall_text(replace(without, has=(1.0,))).endswith(
-            (", required 5 g", ", required: 5 g")
+            (", required 5 g", ", required: a class with 5 g")
         )
 
 
@@ -154,11 +154,11 @@ def test_every_property_has_words(of: Property) -> None:
         ),
         (
             Shortfall("price_class", "consumer", "tactical or chip"),
-            "price class consumer, required: tactical or chip",
+            "price class consumer, required: a class with tactical or chip",
         ),
         (
             Shortfall("price_class", "", "tactical"),
-            "price class not stated, required: tactical",
+            "price class not stated, required: a class with tactical",
         ),
     ],
 )  # fmt: skip
@@ -421,7 +421,7 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
     assert others(rows) == (
         "Also meets the limits: H. Likely meets the limits: E. Meets the limits on conditions: G. "
         "Not enough data: D (no accelerometer). Likely fails: C. "
-        "Fails: B. Excluded: F (price class chip, required: tactical)."
+        "Fails: B. Excluded: F (price class chip, required: a class with tactical)."
     )
 
 

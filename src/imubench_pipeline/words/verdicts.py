@@ -178,8 +178,8 @@ def condition_text(condition: verdicts.Condition) -> str:
     text = f"its {subject_text(condition)} is below {size}"
     if condition.printing is None:
         return f"{text} (1σ)"
-    printing = counted(condition.printing, "datasheet prints", "datasheets print")
-    return f"{text} (1σ; {condition.within} of {printing} such a value)"
+    printing = counted(condition.printing, "datasheet that prints it", "datasheets that print it")
+    return f"{text} (1σ; met by {condition.within} of {printing})"
 
 
 def figure_text(quantity: str, cause: SourceCode, size: float) -> str:
@@ -224,7 +224,7 @@ def _name_property(of: verdicts.Property, subject: str) -> str:
 def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
-        return f"price class {shortfall.subject or 'not stated'}, required: {shortfall.asked}"
+        return f"price class {shortfall.subject or 'not stated'}, required: a class with {shortfall.asked}"
     name = _name_property(shortfall.property, shortfall.subject)
     _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":

@@ -23,6 +23,7 @@ from tests.report.browser.reader import Open, Reader, traces
 from tests.report.tables import joined, recording_rows, site
 
 NIGHT, SIMULATED, FIRST = made.NIGHT, made.SIMULATED, made.DATED[0]
+SENSOR_NAMES = {"alpha": "Vendor & Sons A-1", "beta": "Other B"}
 DRAWN = 2e-3
 """Relative error of limits, whose draws are kept in 16 bits of their logarithm."""
 
@@ -50,10 +51,13 @@ def same(shown: list[float | None], ratio: Ratio, rel: float) -> None:
         assert number == (None if expected is None else pytest.approx(expected, rel=rel))
 
 
-def words(ratio: Ratio) -> str:
+def words(ratio: Ratio, first: made.Log, second: made.Log) -> str:
+    names = [SENSOR_NAMES[log.sensor] for log in (first, second)]
+    if first.sensor == second.sensor:
+        names = [f"{SENSOR_NAMES[log.sensor]} {log.recording}" for log in (first, second)]
     return {
-        "lower": "A has less noise",
-        "higher": "B has less noise",
+        "lower": f"{names[0]} has less noise",
+        "higher": f"{names[1]} has less noise",
         "not significant": "not significant",
         "not determined": "not determined",
     }[ratio.verdict]
@@ -72,7 +76,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             own, other = ({**one.parameters, **one.curve}[symbol] for one in (a, b))
             ratio = compare_parameters(own, other)
             same(rows[symbol]["ratios"][0], ratio, 1e-5)
-            assert words(ratio) in rows[symbol]["texts"][1]
+            assert words(ratio, first, second) in rows[symbol]["texts"][1]
             # With the digits that other pages print of it.
             unit = choose_page_unit(quantity_of(channel), symbol, "practical")
             shown = (own.value, own.lower, own.upper)
@@ -83,9 +87,9 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             pair = (made.fused(log, channel) for log in (first, second))
             ratio = compare_deviations(*pair, tau, longest=1 / 9, **made.DRAWN)
             same(rows[f"adev {tau:g}"]["ratios"][0], ratio, DRAWN)
-            assert words(ratio) in rows[f"adev {tau:g}"]["texts"][1]
+            assert words(ratio, first, second) in rows[f"adev {tau:g}"]["texts"][1]
     # Three times the noise, and no doubt of it.
-    assert "A has less noise" not in reader.page.locator(".answer").inner_text()
+    assert "Other B has less noise" not in reader.page.locator(".answer").inner_text()
     assert "N (3 times)" in reader.page.locator(".answer").inner_text()
 
 
@@ -95,10 +99,10 @@ def test_the_curves_and_their_ratio(read: Open, bench: Report) -> None:
     figure = reader.figure("pair")
     drawn = {one["name"]: one for one in traces(figure) if one["name"]}
     rows = bench.of("allan", recording=NIGHT.recording, channel="gyro_x")
-    curve = drawn["A Vendor & Sons A-1"]
+    curve = drawn["Vendor & Sons A-1"]
     np.testing.assert_allclose(curve["y"], [ARC * row["adev"] for row in rows], rtol=3e-4)
-    assert drawn["B Other B"]["line"]["color"] != curve["line"]["color"]
-    ratio = drawn["A / B"]
+    assert drawn["Other B"]["line"]["color"] != curve["line"]["color"]
+    ratio = drawn["Vendor & Sons A-1 / Other B"]
     np.testing.assert_allclose(ratio["y"], 1 / 3, rtol=0.02)
     assert ratio["x"] == pytest.approx([10 ** (step / 2) for step in range(-2, 5)])
     # 0.42 °/√h is 25.2 °/h at 1 s, and half of it if it is one-sided; and 8 °/h.
@@ -111,7 +115,7 @@ def test_the_curves_and_their_ratio(read: Open, bench: Report) -> None:
         slider.press("ArrowRight")
     assert said.inner_text() != before
     nearest = min(rows, key=lambda row: abs(math.log(row["tau"] / 10**1.5)))
-    assert float(re.search(r"A ([\d.]+) °/h", said.inner_text())[1]) == pytest.approx(
+    assert float(re.search(r"A-1 ([\d.]+) °/h", said.inner_text())[1]) == pytest.approx(
         ARC * nearest["adev"], rel=1e-2
     )
     assert "tau=31.6" in reader.page.url
@@ -239,7 +243,7 @@ def test_what_is_chosen_stands_in_the_address(
     )
     shown = values.locator("tbody tr")
     assert shown.count() == min(len(rows), 400) > 100
-    own = [row for row in rows if row["series"].startswith("B ") and row["lower 95 %"]]
+    own = [row for row in rows if row["series"].startswith("Other B") and row["lower 95 %"]]
     table_rows = bench.of("allan", recording=made.DATED[-1].recording, channel="gyro_x")
     assert len(own) == len(table_rows)
     assert download(again.get_by_role("button", name="as PNG")).startswith(b"\x89PNG")

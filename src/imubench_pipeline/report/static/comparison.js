@@ -1,7 +1,7 @@
 // The sensors or recordings that are compared, and the verdicts on them in sentences and tables.
 
 const LETTERS = "abcdef";
-let chosen = []; // { letter, key, sensor, recording, row }
+let chosen = []; // { name, key, sensor, recording, row }
 let growthOf = { axes: "worst", error: "heading", window: 60, time: 600 };
 let crossed = 10; // s, position of the crosshair
 
@@ -14,12 +14,12 @@ function recordingOf(key) {
 }
 
 function chosenFrom(keys) {
-  return keys.map((key) => ({ key, row: recordingOf(key) })).filter(({ row }) => row)
-    .map(({ key, row }, place) => ({ letter: LETTERS[place].toUpperCase(), key, row, sensor: row.sensor, recording: row.recording }));
+  const found = keys.map((key) => ({ key, row: recordingOf(key) })).filter(({ row }) => row);
+  const several = (sensor) => found.filter(({ row }) => row.sensor === sensor).length > 1;
+  return found.map(({ key, row }) => ({ name: `${nameOf(row.sensor)}${several(row.sensor) ? ` ${row.recording}` : ""}`, key, row, sensor: row.sensor, recording: row.recording }));
 }
 
 const channelFor = (one, channel) => pageData.channels.find((view) => view.sensor === one.sensor && view.recording === one.recording && view.channel === channel);
-const shortName = (one) => (chosen.filter((other) => other.sensor === one.sensor).length > 1 ? `${one.letter} ${nameOf(one.sensor)} ${one.recording}` : `${one.letter} ${nameOf(one.sensor)}`);
 
 // Colour and mark are the sensor's; of two recordings of one, the dash and a hollow mark differ.
 function lookOfChosen(one) {
@@ -89,14 +89,14 @@ function drawPickers(pickers, axes) {
       chosen = chosenFrom(keys);
       again(`select[data-letter=${LETTERS[place]}]`);
     });
-    const label = labelled(one.letter, select);
+    const label = labelled(`Sensor ${place + 1}`, select);
     label.prepend(signOf({ ...lookOfChosen(one), marker: lookOfChosen(one).plain ?? lookOfChosen(one).marker }));
     if (chosen.length < 3) return label;
     const remove = element("button", { type: "button", textContent: "×", className: "remove", onclick: () => {
       chosen = chosenFrom(chosen.filter((other) => other !== one).map((other) => other.key));
       again("select");
     } });
-    remove.setAttribute("aria-label", `Remove ${one.letter}`);
+    remove.setAttribute("aria-label", `Remove ${one.name}`);
     return element("span", {}, label, remove);
   });
   const more = element("button", { type: "button", textContent: "+ one more", hidden: chosen.length >= Math.min(LETTERS.length, pageData.recordings.length), onclick: () => {
@@ -146,7 +146,7 @@ function comparedFigures() {
 // Less noise is better.
 function verdictOf(ratio, first, second) {
   const better = { lower: first, higher: second }[ratio.verdict];
-  return better ? { text: `${better.letter} has less noise`, letter: better.letter, kind: "significant" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
+  return better ? { text: `${better.name} has less noise`, better, kind: "significant" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
 }
 
 function compareChosen(root) {
@@ -159,12 +159,11 @@ function compareChosen(root) {
 const cellOf = (text, more = {}, ...inside) => element("td", { textContent: text, ...more }, ...inside);
 
 function verdictCell(ratio, first, second) {
-  const { text, kind, letter } = verdictOf(ratio, first, second);
+  const { text, kind, better } = verdictOf(ratio, first, second);
   const cell = cellOf("", { className: `judged ${kind}` });
-  const better = chosen.find((one) => one.letter === letter);
   if (better) cell.append(signOf({ ...pageData.looks.sensors[better.sensor], line: false }));
   cell.append(text);
-  if (ratio.reasons.length > 0) cell.append(" ", element("span", { className: "why", textContent: `(${ratio.reasons.join("; ").replaceAll("the first", first.letter).replaceAll("the second", second.letter)})` }));
+  if (ratio.reasons.length > 0) cell.append(" ", element("span", { className: "why", textContent: `(${ratio.reasons.join("; ").replaceAll("the first", first.name).replaceAll("the second", second.name)})` }));
   return cell;
 }
 
@@ -201,13 +200,13 @@ function linesOf(figures) {
 }
 
 function headsOfPairs() {
-  return chosen.slice(1).flatMap((other) => [chosen.length > 2 ? `${chosen[0].letter} or ${other.letter}` : "Verdict", `${chosen[0].letter} / ${other.letter}, 95 %`]);
+  return chosen.slice(1).flatMap((other) => [chosen.length > 2 ? `Verdict: ${chosen[0].name} or ${other.name}` : "Verdict", `Ratio ${chosen[0].name} / ${other.name} (95 % interval)`]);
 }
 
 function drawVerdicts(root, figures) {
   const table = root.querySelector("table.verdicts");
   const missing = chosen.filter((one) => !channelFor(one, chosenChannel));
-  table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map(shortName)));
+  table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map((one) => one.name)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better; significant where the 95 % interval of the ratio excludes 1`;
   table.closest(".scroll").hidden = missing.length > 0;
@@ -216,14 +215,14 @@ function drawVerdicts(root, figures) {
   const common = Object.keys(CHANNEL_NAMES).filter((name) => chosen.every((one) => channelFor(one, name)));
   const instead = common.length > 0 ? `choose ${common.map((name) => CHANNEL_NAMES[name]).join(" or ")}` : "they have no axis in common";
   const words = missing.length > 0
-    ? [`${missing.map(shortName).join(" and ")} recorded no ${CHANNEL_NAMES[chosenChannel]}: ${instead}.`]
+    ? [`${missing.map((one) => one.name).join(" and ")} recorded no ${CHANNEL_NAMES[chosenChannel]}: ${instead}.`]
     : chosen.slice(1).map((other, place) => sentenceOf(figures, chosen[0], other, place));
   root.querySelector(".answer").textContent = words.join("\n");
   root.querySelector(".stands").textContent = chosen.filter((one) => !one.key.includes("/"))
     .map((one) => ({ one, others: pageData.recordings.filter((row) => row.sensor === one.sensor).length - 1 })).filter(({ others }) => others > 0)
-    .map(({ one, others }) => `${shortName(one)}: ${one.recording} is shown, ${one.row.decides ? "the longest usable recording" : "the longest recording, not used in rankings"}${one.row.simulated ? " (simulated)" : ""}; ${others} more above.`).join(" ");
+    .map(({ one, others }) => `${one.name}: ${one.recording} is shown, ${one.row.decides ? "the longest usable recording" : "the longest recording, not used in rankings"}${one.row.simulated ? " (simulated)" : ""}; ${others} more above.`).join(" ");
   const doubted = chosen.filter((one) => doubtsOf(one).length > 0);
-  root.querySelector(".doubts").textContent = doubted.map((one) => `Warnings for ${shortName(one)}: ${doubtsOf(one).join(", ")}.`).join(" ");
+  root.querySelector(".doubts").textContent = doubted.map((one) => `Warnings for ${one.name}: ${doubtsOf(one).join(", ")}.`).join(" ");
 }
 
 const doubtsOf = ({ row }) => [...row.doubts, ...(row.decides ? [] : ["not used in rankings"])];
@@ -238,7 +237,7 @@ function sentenceOf(figures, first, second, place) {
     groups.get(text).of.push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (kind === "significant" ? times : ""));
   }
   const parts = [...groups].sort(([, a], [, b]) => b.better - a.better).map(([text, { of }]) => `${text}: ${of.join(", ")}`);
-  const pair = chosen.length > 2 ? `${first.letter} or ${second.letter}? ` : "";
+  const pair = chosen.length > 2 ? `${first.name} or ${second.name}? ` : "";
   return parts.length > 0 ? `${pair}${parts.join("; ")}.` : "";
 }
 
@@ -252,7 +251,7 @@ function drawEvidence(root) {
     if (row.simulated) named.append(" ", element("span", { className: "badge", textContent: "simulated" }));
     if (own.length > 1 && !one.key.includes("/")) named.append(` (longest of ${own.length})`);
     const specimens = new Set(own.map((other) => other.device)).size;
-    return element("tr", {}, element("th", { scope: "row", textContent: shortName(one) }), named,
+    return element("tr", {}, element("th", { scope: "row", textContent: one.name }), named,
       cellOf(numberText(row.seconds / 3600, 3), { className: "number" }), cellOf(`${specimens}, in ${own.length} ${own.length === 1 ? "recording" : "recordings"}`),
       cellOf(row.temperature ?? "not logged"), cellOf(`${row.rate} Hz`, { className: "number" }), cellOf(doubtsOf(one).join(", ") || "none", { className: "words" }));
   }));

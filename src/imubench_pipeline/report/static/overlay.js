@@ -133,7 +133,7 @@ kinds.overlay = (figure) => {
   const plain = { light: ink, dark: ink };
   // Names stand at the ends of the curves, where there is room for them.
   const named = new Map(here.filter((view) => shown(figure, groupOf(view)) && shown(figure, "measured")).map((view) => [groupOf(view), view]));
-  const roomy = !printing() && figure.clientWidth > 700 && named.size <= 12;
+  const roomy = roomForNames(figure) && named.size <= 12;
   const labels = roomy ? directLabels([...named].map(([key, view]) => ({
     y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
   })), ranges.y) : [];

@@ -6,7 +6,7 @@ const RATIO_TAIL = 0.025;
 // The ratio of { value, lower, upper, status }; limits by the MOVER method on logarithms.
 function ratioOfParameters(first, second) {
   const reasons = [["the first", first], ["the second", second]]
-    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${statusText(one.status)}`);
+    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `the value of ${which} is ${statusText(one.status)}`);
   if (!first.value || !second.value) {
     let low = over(first.lower ?? 0, second.upper);
     const high = over(first.upper, second.lower);

@@ -32,6 +32,7 @@ function directLabels(ends, yRange, yref = "y") {
   });
 }
 
+const roomForNames = (figure) => !printing() && figure.clientWidth > 700;
 const lineOf = (look) => ({ color: colourOf(look), dash: look.dash, width: 1.8 });
 
 kinds.pair = (figure) => {
@@ -43,7 +44,7 @@ kinds.pair = (figure) => {
   };
   const traces = [];
   const ends = [];
-  const name = ({ one }) => shortName(one);
+  const name = ({ one }) => one.name;
   for (const each of here) {
     const { view, look, one } = each;
     const tau = array(view.tau);
@@ -52,19 +53,19 @@ kinds.pair = (figure) => {
     traces.push({
       type: "scatter", mode: "lines+markers", x: tau, y, name: name(each), meta: { low, high }, line: lineOf(look),
       marker: { color: colourOf(look), symbol: look.marker, size: tau.map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
-      text: tau.map((t, i) => `${one.letter} τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])}`),
+      text: tau.map((t, i) => `${one.name} τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])}`),
       hovertemplate: "%{text}<extra></extra>",
     });
-    ends.push({ y: Math.log10(y.at(-1)), text: one.letter, colour: colourOf(look) });
+    ends.push({ y: Math.log10(y.at(-1)), text: wrapped(one.name), colour: colourOf(look) });
     const model = view.models[view.recommended];
     if (model) traces.push(line(array(model[0]), scaled(model[1], unit.factor), { ...look, width: 1 }, { group: "model", name: `${name(each)}, model`, opacity: 0.8 }));
     for (const printed of pageData.datasheets[one.sensor][chosenChannel] ?? []) {
       const at = printed.slope !== 0 ? [1 / 3, 1, 3] : [tau.at(-1) / 10, tau.at(-1) / 3, tau.at(-1)];
       traces.push({
-        group: "datasheet", type: "scatter", mode: "lines+markers", name: `${one.letter} datasheet: ${printed.label}`, x: at,
+        group: "datasheet", type: "scatter", mode: "lines+markers", name: `${one.name} datasheet: ${printed.label}`, x: at,
         y: printedLine(printed, at, unit), line: { color: colourOf(look), width: 1.2, dash: "dot" },
         marker: { color: inks().paper, symbol: "diamond", size: [0.1, 10, 0.1], line: { color: colourOf(look), width: 1.6 } },
-        hoverinfo: ["skip", "text", "skip"], text: `${one.letter} datasheet: ${printed.label}`,
+        hoverinfo: ["skip", "text", "skip"], text: `${one.name} datasheet: ${printed.label}`,
       });
     }
   }
@@ -77,11 +78,11 @@ kinds.pair = (figure) => {
     const y = ratios.map(({ value, values }) => value ?? values[0] / values[1]);
     extent.push(...low, ...high);
     traces.push(...band(x, low, high, other.look, 0.22, { yaxis: "y2", group: "ratio" }));
-    const label = `${chosen[0].letter} / ${other.one.letter}`;
+    const label = `${chosen[0].name} / ${other.one.name}`;
     traces.push({
       group: "ratio", yaxis: "y2", type: "scatter", mode: "lines+markers", x, y, name: label, meta: { low, high, of: "ratio" },
       line: lineOf(other.look), marker: { color: colourOf(other.look), size: 6, symbol: ratios.map((ratio) => (["not significant", "not determined"].includes(ratio.verdict) ? `${(other.look.plain ?? other.look.marker)}-open` : other.look.plain ?? other.look.marker)) },
-      text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
+      text: ratios.map((ratio, i) => `${label} at ${numberText(x[i], 3)} s: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
       hovertemplate: "%{text}<extra></extra>",
     });
   });
@@ -99,12 +100,12 @@ kinds.pair = (figure) => {
     ],
     height: printing() ? 380 : 470,
     layout: {
-      margin: { l: 62, r: 26, t: 8, b: 46 }, hovermode: "x", hoversubplots: "axis",
+      margin: { l: 62, r: roomForNames(figure) ? 150 : 26, t: 8, b: 46 }, hovermode: "x", hoversubplots: "axis",
       xaxis: { ...logAxis("averaging time τ (s)", ranges.x), anchor: "y2" },
       yaxis: { ...logAxis(`Allan deviation (${unit.sign})`, ranges.y), domain: upper },
-      yaxis2: { ...logAxis(here.length > 2 ? `σ of ${chosen[0].letter} / other` : `σ of ${chosen.map((one) => one.letter).join(" / ")}`, ratioRange), domain: [0, 0.27] },
+      yaxis2: { ...logAxis("ratio of σ", ratioRange), domain: [0, 0.27] },
       annotations: [
-        ...directLabels(ends, ranges.y),
+        ...(roomForNames(figure) ? directLabels(ends, ranges.y) : []),
         ...(shown(figure, "slopes") ? slopes.annotations : []),
         { xref: "paper", x: 0.995, xanchor: "right", yref: "y2", y: 0, yanchor: "bottom", text: "1: equal", showarrow: false, font: { size: 11, color: soft } },
       ],
@@ -150,8 +151,8 @@ function crosshairText(tau) {
     if (!view) return [];
     const times = array(view.tau);
     const at = times.reduce((best, t, i) => (Math.abs(Math.log(t / tau)) < Math.abs(Math.log(times[best] / tau)) ? i : best), 0);
-    if (Math.abs(Math.log10(times[at] / tau)) > 0.2) return [`${one.letter} –`];
-    return [`${one.letter} ${numberText(scaled(view.adev, unit.factor)[at], 3)} ${unit.sign}`];
+    if (Math.abs(Math.log10(times[at] / tau)) > 0.2) return [`${one.name} –`];
+    return [`${one.name} ${numberText(scaled(view.adev, unit.factor)[at], 3)} ${unit.sign}`];
   });
   return `${numberText(tau, 2)} s: ${parts.join(", ")}`;
 }
@@ -162,7 +163,7 @@ kinds.dumbbells = (figure) => {
   const extent = [1];
   const { soft } = inks();
   const narrow = figure.clientWidth < 560;
-  const words = figures.map(({ label, long, own, unit }) => narrow ? symbolMarkup(label) : `${long}<br>${own.map((one, i) => `${chosen[i].letter} ${one.value === null ? "–" : estimateTexts(one.value, one.lower, one.upper, unit)[0]}`).join(", ")} ${unit.sign}`);
+  const words = figures.map(({ label, long, own, unit }) => narrow ? symbolMarkup(label) : `${long}<br>${own.map((one, i) => `${chosen[i].name} ${one.value === null ? "–" : estimateTexts(one.value, one.lower, one.upper, unit)[0]}`).join(", ")} ${unit.sign}`);
   figures.forEach(({ own }, place) => {
     const base = own[0].value;
     const middle = (one) => one.value ?? (one.lower > 0 && one.upper ? Math.sqrt(one.lower * one.upper) : one.upper);
@@ -177,10 +178,10 @@ kinds.dumbbells = (figure) => {
       extent.push(values[i], ...(bounded ? [one.lower / base, one.upper / base] : []));
       const surely = one.value !== null && one.status === "ok";
       traces.push({
-        type: "scatter", mode: "markers", x: [values[i]], y: [place], name: shortName(chosen[i]), meta: { flat: true },
+        type: "scatter", mode: "markers", x: [values[i]], y: [place], name: chosen[i].name, meta: { flat: true },
         marker: { color: surely ? colourOf(look) : inks().paper, symbol: look.plain ?? look.marker, size: 11, line: { color: colourOf(look), width: surely && !look.plain ? 0 : 2 } },
         error_x: bounded ? { type: "data", symmetric: false, array: [one.upper / base - values[i]], arrayminus: [values[i] - one.lower / base], color: colourOf(look), thickness: 2, width: 5 } : undefined,
-        hovertemplate: `${shortName(chosen[i])}: ${numberText(values[i], 3)} times ${chosen[0].letter}<extra></extra>`,
+        hovertemplate: `${chosen[i].name}: ${numberText(values[i], 3)} times ${chosen[0].name}<extra></extra>`,
       });
     });
   });
@@ -188,11 +189,11 @@ kinds.dumbbells = (figure) => {
     traces, groups: [], height: 110 + (printing() ? 30 : 52) * figures.length,
     layout: {
       margin: { l: 10, r: 20, t: 12, b: 50 },
-      xaxis: logAxis(`times that of ${shortName(chosen[0])}`, logRange(extent, 0.08)),
+      xaxis: logAxis(`divided by the value of ${chosen[0].name}`, logRange(extent, 0.08)),
       yaxis: { ...linearAxis(""), tickvals: words.map((_, i) => i), ticktext: words, range: [-0.6, Math.max(figures.length, 1) - 0.4], fixedrange: true },
       shapes: [{ type: "line", x0: 1, x1: 1, yref: "paper", y0: 0, y1: 1, line: { color: soft, width: 1 } }],
       annotations: figures.flatMap(({ own }, y) => (own[0].value ? [] : [{
-        xref: "paper", x: 0.01, y, xanchor: "left", showarrow: false, text: `${chosen[0].letter} has no value to compare with`, font: { color: soft, size: 12 }, bgcolor: inks().paper,
+        xref: "paper", x: 0.01, y, xanchor: "left", showarrow: false, text: `${chosen[0].name} has no value to compare with`, font: { color: soft, size: 12 }, bgcolor: inks().paper,
       }])),
     },
   };
@@ -316,13 +317,13 @@ function drawErrors(root) {
       figures.push({ symbol: error, label: error, unit: (size) => errorUnit(error, size), own, ratios: own.slice(1).map((other) => ratioOfParameters(own[0], other)) });
     }
   }
-  table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
+  table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map((one) => one.name)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
-  const without = chosen.filter((one) => !grownOf(one)).map(shortName);
+  const without = chosen.filter((one) => !grownOf(one)).map((one) => one.name);
   table.caption.textContent = `Errors from noise alone (1σ, ${axesText()}): biases and tilt estimated over ${timeText(growthOf.window)} at rest, then ${timeText(growthOf.time)} of dead reckoning${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
 }
 
-kinds.growth = () => {
+kinds.growth = (figure) => {
   const [sign, factor] = pageData.errors[growthOf.error].axis;
   const traces = [];
   const extent = [];
@@ -340,12 +341,12 @@ kinds.growth = () => {
     traces.push(...band(times, low, high, look, 0.18, { group: "limits" }));
     const axes = [grown.gyro, grown.accel].map((channels) => channels[channels.length > 1 ? window * times.length + times.length - 1 : 0]).filter(Boolean);
     traces.push({
-      type: "scatter", mode: "lines+markers", x: times, y, name: shortName(one), meta: { low, high }, line: lineOf(look),
+      type: "scatter", mode: "lines+markers", x: times, y, name: one.name, meta: { low, high }, line: lineOf(look),
       marker: { color: colourOf(look), symbol: look.marker, size: 7 },
-      text: times.map((t, i) => `${shortName(one)} after ${timeText(t)}: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
+      text: times.map((t, i) => `${one.name} after ${timeText(t)}: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
       hovertemplate: "%{text}<extra></extra>",
     });
-    ends.push({ y: Math.log10(y.at(-1)), text: one.letter, colour: colourOf(look) });
+    ends.push({ y: Math.log10(y.at(-1)), text: wrapped(one.name), colour: colourOf(look) });
   }
   const { soft } = inks();
   const range = logRange(extent, 0.15);
@@ -355,9 +356,9 @@ kinds.growth = () => {
       { key: "limits", label: "95 % band", on: true, look: { ...black(), filled: true } },
     ],
     layout: {
-      margin: { l: 62, r: 26, t: 8, b: 46 },
+      margin: { l: 62, r: roomForNames(figure) ? 150 : 26, t: 8, b: 46 },
       xaxis: logAxis("time of dead reckoning (s)", logRange(every, 0.08)), yaxis: logAxis(`${growthOf.error}, 1σ (${sign})`, range),
-      annotations: directLabels(ends, range),
+      annotations: roomForNames(figure) ? directLabels(ends, range) : [],
       shapes: [{ type: "line", xref: "x", x0: growthOf.time, x1: growthOf.time, yref: "paper", y0: 0, y1: 1, line: { color: soft, width: 1, dash: "dot" } }],
     },
   };
@@ -370,9 +371,9 @@ kinds.sources = (figure) => {
     here.map((one) => {
       const ends = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
       const unit = errorUnit(growthOf.error, ends[0]);
-      return `${wrapped(shortName(one))}<br>${estimateTexts(...ends, unit)[0]} ${unit.sign}`;
+      return `${wrapped(one.name)}<br>${estimateTexts(...ends, unit)[0]} ${unit.sign}`;
     }),
-    shares, here.map(shortName), figure.clientWidth,
+    shares, here.map((one) => one.name), figure.clientWidth,
   );
 };
 

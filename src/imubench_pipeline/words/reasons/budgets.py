@@ -47,4 +47,4 @@ def missing_numbers(names: Sequence[str]) -> str:
     return f"the error has {join_names([f'no {_NUMBERS[name]}' for name in names])}"
 
 
-NOISE_NOT_PRINTED = "a part of its noise is not printed, so a log decides"
+NOISE_NOT_PRINTED = "its datasheet does not print all noise parameters: a log is needed"

@@ -88,7 +88,8 @@ def tau_beyond(longest: float) -> str:
 
 
 def undetermined(symbol: str, recording: str, channel: str, status: Status) -> str:
-    return f"{symbol_text(symbol)} of {recording} {channel_name(channel)} is {STATUS_WORDS[status]}"
+    parameter = f"{symbol_text(symbol)} of {channel_name(channel)}"
+    return f"in recording {recording}, {parameter} is {STATUS_WORDS[status]}"
 
 
 def short_for_windows(windows: int, span: float, needed: float, longest: float) -> str:
