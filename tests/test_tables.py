@@ -82,7 +82,7 @@ def test_no_file_holds_a_number_that_is_not_finite(
         write_arrow(wrong, path)
     assert not path.exists()
     pq.write_table(wrong, path)
-    with pytest.raises(TableError, match=f"{fault}: remove the file"):
+    with pytest.raises(TableError, match=f"{fault}; remove the file"):
         read("allan", [path])
 
 

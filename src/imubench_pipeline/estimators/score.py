@@ -55,7 +55,7 @@ def beats(one: Array, other: Array) -> float:
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Return the scores of a model (m,) and its draws (k, m) against a curve (m,), all in SI."""
+    """Return scores of a model, shape (m,), and its draws, (k, m), against a curve, (m,), SI."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)
