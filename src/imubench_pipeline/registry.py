@@ -42,23 +42,23 @@ class Extension:
     name: str
     needs: tuple[str, ...] = ()  # other extensions, without which it is not used
     tables: str | None = None  # the module with the classes of its rows
-    blocks: tuple[Block, ...] = ()  # of settings
+    blocks: tuple[Block, ...] = ()  # blocks of settings
     rules: str | None = None  # file of its rules for Snakemake
-    motions: Mapping[str, str] = field(default_factory=dict)  # simulated ones, by their block
-    simulations: Mapping[str, str] = field(default_factory=dict)  # of sensors, by their block
-    formats: Mapping[str, str] = field(default_factory=dict)  # of log files, by `reader`
+    motions: Mapping[str, str] = field(default_factory=dict)  # simulated motions, by block
+    simulations: Mapping[str, str] = field(default_factory=dict)  # simulated sensors, by block
+    formats: Mapping[str, str] = field(default_factory=dict)  # formats of log files, by `reader`
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
-    sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
+    sensor_tables: Mapping[str, str] = field(default_factory=dict)  # tables of one sensor, by name
     drawings: tuple[str, ...] = ()  # figures of all sensors for print
-    theory_figure: str | None = None  # of the page of theory
-    commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
+    theory_figure: str | None = None  # figure for the page of theory
+    commands: Mapping[str, str] = field(default_factory=dict)  # commands of `imubench`, by name
     library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
-    sensor_commands: tuple[str, ...] = ()  # on the page of a sensor
+    sensor_commands: tuple[str, ...] = ()  # commands shown on the page of a sensor
     listings: tuple[str, ...] = ()  # further tables of `imubench formats`
-    pages: tuple[str, ...] = ()  # that a report has once
+    pages: tuple[str, ...] = ()  # pages that a report has once
     recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording
-    sections: tuple[str, ...] = ()  # of pages that a report has once
-    recording_sections: tuple[str, ...] = ()  # of the page of a static recording
+    sections: tuple[str, ...] = ()  # sections of pages that a report has once
+    recording_sections: tuple[str, ...] = ()  # sections of the page of a static recording
     search: tuple[str, ...] = ()  # names that the search of the report finds
     templates: str | None = None  # folder
     static: str | None = None  # folder with scripts of the pages

@@ -29,9 +29,9 @@ Mask = NDArray[np.bool_]
 
 MIN_BINS = 20  # Bins that a fit needs; the papers' model has four parameters
 _LINE_MODEL_BAND = 0.05  # Fraction of the rate below which the model for line detection is fitted
-_MIN_CORRELATION_SAMPLES = 3.0  # Of the shortest process that is tried without a filter
-_MAX_FILTER_BIAS = 0.5  # Of S_N within the band, in standard errors
-_UNKNOWN_FILTER_BAND = 1 / 10  # Over the cut-off, where no filter of the family fits the bend
+_MIN_CORRELATION_SAMPLES = 3.0  # T_B of the shortest process that is tried without a filter
+_MAX_FILTER_BIAS = 0.5  # Bias of S_N within the band, in standard errors
+_UNKNOWN_FILTER_BAND = 1 / 10  # Band over the cut-off, if no filter of the family fits the bend
 _MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
 
 

@@ -232,10 +232,10 @@ _MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is
 _MAX_RELATIVE_ERROR_TIME = 0.75
 """Beyond it B is not identified either: in white logs B often seems known, T_B in 1 of 200."""
 
-_MAX_RELATIVE_ERROR_HELD = 0.25  # Of B with T_B fixed, and of N and K with B fixed
+_MAX_RELATIVE_ERROR_HELD = 0.25  # The same for B with T_B fixed, and for N and K with B fixed
 _CLIP_RELATIVE_ERROR = 10.0  # Larger ones would overflow in the limits
 _LOG_TIME_STEP = 1e-3  # Step of log T_B in the finite difference
-_LOG_PARAMETER_STEP = 0.05  # Of the finite differences of the lowest point
+_LOG_PARAMETER_STEP = 0.05  # Step of the finite differences of the lowest point
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ _WIDTH_LEVEL = 0.1  # Fraction of the highest excess at which the width of a lin
 _NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20  # Bins from a sinusoid to its neighbourhood
 _MAX_NEIGHBOUR_CHANCE = 1e-4
 _MIN_AMPLITUDE_RATIO = 1.1
-_MAX_LINE_LEAKAGE = 0.3  # Into a bin of the likelihood, in standard errors of the bin
+_MAX_LINE_LEAKAGE = 0.3  # Leakage into a bin of the likelihood, in standard errors of the bin
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;

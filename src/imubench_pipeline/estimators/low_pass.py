@@ -25,7 +25,7 @@ from imubench_pipeline.typing import Array
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
 BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
-_ALIASES = 3  # Of flicker noise on each side; the filter leaves little of the others
+_ALIASES = 3  # Aliases of flicker noise on each side; the filter leaves little of the others
 _GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 

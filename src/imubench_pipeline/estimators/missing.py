@@ -21,7 +21,7 @@ from imubench_pipeline.typing import Array
 
 BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
 _MAX_GAP_BLOCKS = 1024  # A longer gap splits the log: both sides are independent
-_MIN_DRIVE = 1e-9  # Of the slow part over a block, over the white noise of a mean: it is constant
+_MIN_DRIVE = 1e-9  # Least step variance of the slow part, over the white noise variance of a mean
 
 
 @dataclass(frozen=True)

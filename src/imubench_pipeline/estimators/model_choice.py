@@ -78,7 +78,7 @@ CANDIDATE_MODELS = (
 """Models that are always fitted. A ramp and quantization noise are then added to the best one; if
 BIC favours quantization noise, it is added to all of them."""
 
-WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; a slower process looks like a walk
+WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; above it, a process looks like a walk
 
 BIC_PENALTY_UNIT_ROOT = 4.0
 """Added to the BIC of a model with such a process, or with a ramp, but without a random walk, which

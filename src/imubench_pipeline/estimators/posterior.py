@@ -32,7 +32,7 @@ from imubench_pipeline.estimators.whittle_kernels import Problem, interpolate_sh
 from imubench_pipeline.typing import Array
 
 _MIN_DEGREES = 5
-_FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
+_FIRST_MIXTURE_WEIGHT = 0.15  # In later mixtures, to keep the whole support covered
 _MIN_COMPONENT_MASS = 0.01
 _LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
 _EM_STEPS = 3  # Expectation-maximisation steps between two rounds

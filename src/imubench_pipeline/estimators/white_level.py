@@ -16,8 +16,8 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_mode
 from imubench_pipeline.noise import compute_driving_density
 from imubench_pipeline.typing import Array
 
-_MAX_PROCESS_SHARE = 0.06  # Of the Allan variance, up to which it has the slope of white noise
-_MIN_TAU_OVER_TIME = 25.0  # Up to which the level of white noise and process must be visible
+_MAX_PROCESS_SHARE = 0.06  # Share of the Allan variance that hardly changes the white slope
+_MIN_TAU_OVER_TIME = 25.0  # Tau over T_B at which the level of both must be visible
 _MIN_WHITE_SAMPLES = 15.0  # Longest cluster with this slope, where white noise is visible
 
 

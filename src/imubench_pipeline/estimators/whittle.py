@@ -130,13 +130,13 @@ def _flicker_edge(order: float) -> float:
 
 SHAPES = 192  # Correlation times at which the shape of a Gauss-Markov process is tabulated
 COARSE = 48  # Correlation times that suffice to detect lines and the band
-_GRID_STEPS = {1: 4, 2: 8}  # Of the table of shapes, between places where a search may start
+_GRID_STEPS = {1: 4, 2: 8}  # Steps of the table between starts, by number of processes
 _MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
 _SCAN_TOLERANCE = 1e-2  # Tolerance of the cost when correlation times are only compared
 _POLISH_TOLERANCE = 1e-6
 _LOG_TIME_TOLERANCE = 5e-4  # Tolerance of the logarithm of a correlation time
 _MAX_TURNS = 8
-_MIN_TURN_GAIN = 1e-4  # Of log likelihood by a turn over both correlation times
+_MIN_TURN_GAIN = 1e-4  # Gain of log likelihood by a turn over both correlation times
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.words.findings.base import FindingData
 
-LEFT_OUT = ("rejected", "failed")  # of recordings that are left out: listed by themselves
+LEFT_OUT = ("rejected", "failed")  # codes of findings about left-out recordings, listed separately
 
 _HALF_REASON = 700
 _ADDRESS = re.compile(r" at 0x[0-9a-f]{6,}")

@@ -45,7 +45,7 @@ class Output:
     path: Path  # as it was named
     adds_to: Collection[str] = ()  # kinds of places to which it may add new files
     force: bool = False  # replace regular files
-    places: Callable[[Path], Iterable[Place]] = lambda _: ()  # of the projects about a path
+    places: Callable[[Path], Iterable[Place]] = lambda _: ()  # protected ones around a path
     inputs: Sequence[Path] = ()  # files that the command reads
 
     def __str__(self) -> str:
@@ -66,7 +66,7 @@ class Output:
             raise OutputError(f"{self}: {explain(error)}") from None
         real = Path(os.path.realpath(self.path))
         if status is not None and not _is_at(real, status):
-            raise OutputError(f"{self} has no path of its own, like a pipe; choose a regular file")
+            raise OutputError(f"{self} leads to no named file, but to a pipe, say; choose a file")
         there = next(folder for folder in (real, *real.parents) if folder.exists())
         if status is None and not there.is_dir():
             raise OutputError(

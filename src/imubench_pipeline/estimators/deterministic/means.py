@@ -22,7 +22,7 @@ _MAX_PAUSES = 48  # with more, samples are lost, and the sensor does not restart
 _MAX_GAP_FRACTION = 1 / 5  # fraction of a segment; a longer gap splits it
 _SECTIONS = 16
 _MIN_SECTION_BLOCKS = 16  # blocks that each section needs for the test of stationarity
-_MIN_SIGMAS = 4.5  # of a trend, with 14 degrees of freedom: a false alarm in 2000 logs
+_MIN_SIGMAS = 4.5  # of a trend, with 14 degrees of freedom: one false alarm in 2000 logs
 _MIN_RELATIVE_TREND = 0.02  # smallest relative change of N over the log that is reported
 
 

@@ -174,8 +174,8 @@ def _tabulate(n: int) -> list[tuple[RegressorKind, Array, Array]]:
 
 MAX_REGRESSORS = 16  # besides restarts; a log with more of them has telegraph noise
 _HELD_OUT_ORDINATES = 16  # lowest ordinates to which the noise is extrapolated instead of fitted
-_MIN_SCORE = 0.5  # of the threshold; weaker candidates are not tested with refitted noise
-_MIN_KEPT_GAIN = 12.0  # of a regressor in the final fit, given the regressors found later
+_MIN_SCORE = 0.5  # share of the threshold; weaker candidates are not tested with refitted noise
+_MIN_KEPT_GAIN = 12.0  # least gain of a regressor in the final fit, given later regressors
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from imubench_pipeline.words.findings.base import SLOW, WHITE, FindingData
 _KINDS = {
     kind.code: kind for kind in (changes.BiasStep, changes.WarmUpDrift, changes.PeriodicDrift)
 }
-_MIN_EFFECT = 0.1  # of the interval of a value, or of the mean
+_MIN_EFFECT = 0.1  # least effect, over the interval of a value or over the mean
 
 
 @dataclass(frozen=True)

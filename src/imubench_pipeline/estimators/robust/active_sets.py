@@ -24,7 +24,7 @@ TERMS = 5
 
 _GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation time must bring
 _GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
-_MAX_PROFILE_LOSS = 3.84  # Of chi-squared at 95 % limits
+_MAX_PROFILE_LOSS = 3.84  # Increase of chi-squared at 95 % limits
 _RIDGE = 1e-12  # Relative, for collinear columns
 
 

@@ -27,7 +27,7 @@ LONGEST_OF_PARTS = 1 / 15
 """Longest tau at which parts are compared, as a part of the log: 2.5 clusters in a part."""
 
 _DIVISIONS = (2, 3, 6)
-_SIGNIFICANCE = 0.95  # Of an excess that counts
+_SIGNIFICANCE = 0.95  # Quantile of chi-squared above which an excess counts
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ def _compute_chance(gaps: Array, step: float) -> float:
 
 
 DRAWN_PATHS = 24  # paths drawn around the most likely one
-_LOG_DENSITIES = (-16.0, 4.0)  # of the walk, over the squared range of the readings
+_LOG_DENSITIES = (-16.0, 4.0)  # log10 of the walk's density over the squared range of the readings
 _MIN_CELL_FRACTION = 0.5
 """Fraction of blocks with readings of one level; if fewer, noise averages the steps."""
 

@@ -20,7 +20,7 @@ from imubench_pipeline.typing import Array
 LAGS = 16  # lags of a scan
 _MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0  # s
-_ROUNDS = 3  # of effect and noise; more change nothing in benchmarks/temperature.py
+_ROUNDS = 3  # rounds of effect and noise; more change nothing in benchmarks/temperature.py
 _FINE_LAGS = 48
 _MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not in the fine scan
 _MIN_OTHER_NOISE = 1e-3  # least fraction of the density that is not random walk

@@ -260,7 +260,7 @@ class Term(ABC):
         yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over ``time``, s, starting at ``on_time``, s."""
+        """Return the variance of its mean over ``time`` that begins ``on_time`` after power-on."""
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:

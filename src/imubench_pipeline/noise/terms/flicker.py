@@ -42,7 +42,7 @@ It is e^-a times a polynomial of e^-2a with these coefficients.
 
 _MEMBERS_PER_DECADE = 2.5
 _POINTS_PER_DECADE = 20
-_LAST_TIME_FACTOR = 4.0  # of the longest correlation time, over the one with its peak at the end
+_LAST_TIME_FACTOR = 4.0  # longest correlation time over the one that peaks at the end
 _MAX_EXACT_SIZE = 1 << 12  # largest cluster with an exact sum for the Allan variance
 
 
