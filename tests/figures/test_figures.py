@@ -444,7 +444,7 @@ def test_the_command_writes_beside_the_tables(results: Path) -> None:
     ("asked", "said"),
     [
         (("--sensor", "z"), "found no sensor 'z'; there are: a, b"),
-        (("--sensor", "c"), "found no sensor 'c' but a rejected one (no stamps); there are: a, b"),
+        (("--sensor", "c"), "with a curve; status rejected (no stamps); there are: a, b"),
         (("--sensor", "a", "--recording", "q"), "found no recording 'q'; there are: r1, r2"),
         (("--channel", "gyro_q"), "found no channel 'gyro_q'; there are: gyro_x"),
         (

@@ -68,7 +68,7 @@ def test_channels_are_simulated_each_by_a_stream_of_its_own() -> None:
         ({"rate": [1], "samples": 5}, r"rate is \[1\]"),
         ({"rate": 10}, "neither is given"),
         ({"rate": 10, "samples": 5, "duration": 1}, "both are given"),
-        ({"rate": 10, "samples": 5.5}, "5.5 samples; expected a whole number"),
+        ({"rate": 10, "samples": 5.5}, "samples is 5.5; expected a whole number"),
         ({"rate": 10, "duration": "5 Hz"}, "duration: 'Hz' is no unit of time"),
         ({"rate": 10, "samples": 5, "seed": 1, "rng": np.random.default_rng(1)}, "expected one of"),
         ({"model": 3, "rate": 10, "samples": 5}, "model is 3, expected a NoiseModel"),

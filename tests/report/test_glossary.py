@@ -136,7 +136,7 @@ def test_a_key_in_two_sections_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     file = tmp_path / "glossary.yaml"
     file.write_text("one:\n  N: {name: N, short: A.}\ntwo:\n  N: {name: N, short: B.}\n")
     monkeypatch.setattr(module, "_FILE", file)
-    with pytest.raises(ConfigError, match="N stands in one and two"):
+    with pytest.raises(ConfigError, match="'N' is in 'two' and above it; remove one"):
         read_glossary.__wrapped__()
 
 

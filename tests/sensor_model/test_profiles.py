@@ -141,9 +141,9 @@ def test_a_file_is_interpolated_in_blocks_of_any_size(
         ("time,temperature [m]\n0,1\n", "no unit of temperature"),
         (
             "time,temperature\n0,1\n0,2\n",
-            "ascend in row 2: 0 s after 0 s; expected each row later .*: put the rows in order",
+            "ascend in row 2: 0 s after 0 s; expected each row later .*; put the rows in order",
         ),
-        ("time,temperature\n0,1\n1,\n", "missing in row 2; expected one a row"),
+        ("time,temperature\n0,1\n1,\n", "missing in row 2; expected one in each row"),
         ("time [s];temperature [degC]\n0;1\n", "names 'time .*'; expected commas between columns"),
         ("time;temperature\n0,5;1,5\n1,5;2,5\n", "; expected commas .*, points before decimals"),
         ("time,temperature\n0,1\n1,x\n", "cannot be read"),

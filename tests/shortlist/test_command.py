@@ -40,7 +40,10 @@ def test_the_command_prints_the_verdicts(folder: Path, capsys: pytest.CaptureFix
     assert ask(folder) == 0
     printed = capsys.readouterr().out
     assert "A robot" in printed and "not enough data" in printed
-    assert "one: its datasheet does not print all noise parameters: a log is needed; assumed worst" in printed
+    assert (
+        "one: its datasheet does not print all noise parameters: a log is needed; assumed worst"
+        in printed
+    )
     assert "by logs" not in printed
     assert ask(folder, requirement=str(folder / "requirements/robot.yaml")) == 0
     assert capsys.readouterr().out == printed

@@ -345,7 +345,7 @@ def test_a_report_is_not_written_without_what_it_shows(
     (results / lost).unlink()
     (results / "report/pages.json").unlink()  # all pages are written again
     assert main(["report", str(results)]) == 2
-    assert f"{lost}: is no longer there" in capsys.readouterr().err
+    assert f"{lost}: missing, and the report needs it" in capsys.readouterr().err
 
 
 def test_a_report_that_is_written_again_is_as_it_was_left(

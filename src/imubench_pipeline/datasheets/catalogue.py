@@ -16,7 +16,7 @@ _OF_FIGURE = {"unit", "option", "condition", "place", "evidence"}
 
 
 def list_catalogue(sensors: Mapping[str, Sensor]) -> Iterator[CatalogueRow]:
-    """Yield a row for each figure of all sensors, or number of it, in the order of the files."""
+    """Yield a row for each number of each figure of all sensors, in the order of the files."""
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet
         sheet: QuantityDatasheet | None = getattr(datasheet, quantity)

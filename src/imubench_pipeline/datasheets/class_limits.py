@@ -4,9 +4,9 @@ A document may make several statements about a figure: typical and maximum, at 2
 range, an offset and its repeatability. The statement with the least standard deviation counts, so
 that a further figure never makes a sensor worse, and none that is left out makes it better. A
 typical figure is one standard deviation, a maximum three, and the end of a range the root of three.
-A total over the temperature range bounds the coefficient: it is reached over half of the range. An
-rms over the range is the coefficient times the range over the root of 12. Of several options, such
-as grades and ranges, the best one counts for each figure, unless the file selects some.
+A total over the temperature range bounds the coefficient: it is reached in half of the range. An
+rms over the range is the coefficient times the range, divided by the root of 12. Of several options
+(grades, ranges), the best one counts for each figure, unless the file selects some.
 
 A sensor that prints no figure counts as the worst of its class (`find_limit`).
 """
@@ -69,7 +69,7 @@ _SEPARATOR = "; "
 
 @dataclass(frozen=True)
 class ClassLimit:
-    """One figure of the sensors of a class, SI, one standard deviation."""
+    """The range of a figure among the sensors of a class, SI, as one standard deviation."""
 
     grade: str
     quantity: str  # ``gyro`` or ``accel``
@@ -79,8 +79,8 @@ class ClassLimit:
     best: float
     median: float
     worst: float
-    spread: float | None  # standard deviation of the logarithm; None: of one sensor
-    sensors: Mapping[str, float]  # the figure of each of them
+    spread: float | None  # standard deviation of the logarithm; None with one sensor
+    sensors: Mapping[str, float]  # the figure of each sensor
 
 
 def derive_class_limits(sensors: Mapping[str, Sensor]) -> list[ClassLimit]:
@@ -128,11 +128,11 @@ def _load_shipped() -> dict[tuple[str, str, str], ClassLimit]:
 
 
 def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
-    """Return the shipped limit of a figure for a class, without a grade for all of them.
+    """Return the shipped limit of a figure for a class; grade None: for all classes together.
 
     A class with fewer than three sensors is not taken to be better than the next better class: its
-    worst figure is the worst of both. Where neither prints the figure, the next class below counts.
-    Raises a KeyError if no sensor of the catalogue prints it.
+    worst figure is the worst of both. If no sensor of the class prints the figure, the next worse
+    class is used. Raises KeyError if no sensor of the catalogue prints it.
     """
     limits = [_load_shipped().get((each, quantity, figure)) for each in _GRADES]
     known = [limit for limit in limits if limit]
@@ -151,7 +151,7 @@ def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
 
 
 def count_sensors_within(quantity: str, figure: str, largest: float) -> tuple[int, int]:
-    """Return how many sensors of the catalogue print at most ``largest``, SI, and how many any."""
+    """Return how many sensors print a figure up to ``largest``, SI, and how many print it."""
     values = find_limit(None, quantity, figure).sensors.values()
     return sum(value <= largest for value in values), len(values)
 
@@ -221,7 +221,7 @@ def _unit_of(quantity: str, figure: str) -> str:
 
 
 def write_class_limits(limits: Iterable[ClassLimit]) -> str:
-    """Return limits as CSV, with numbers of four digits; the last column has the figures."""
+    """Return limits as CSV, with four digits; the last column has the figure of each sensor."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(field.name for field in fields(ClassLimit))

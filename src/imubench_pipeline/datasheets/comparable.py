@@ -1,7 +1,7 @@
 """Convert printed figures to SI, in the convention of the estimate that they are compared with.
 
-A printed noise density is mostly one-sided, and N is that density over √2; if the datasheet does
-not say, both readings are returned. A printed bias instability is the minimum of the Allan
+A printed noise density is mostly one-sided, and N is this density divided by √2. If the datasheet
+does not say, both readings are returned. A printed bias instability is the minimum of the Allan
 deviation, 0.664 B with a plateau. A temperature coefficient can be compared with the sensitivity of
 a static log; a total or an rms over temperature cannot.
 """
@@ -42,7 +42,7 @@ class Comparable:
     quantity: str
     statistic: str
     figure: PrintedFigure | None  # None: not published, or not looked up
-    sidedness: str | None = None  # of a noise density, in this reading
+    sidedness: str | None = None  # how a noise density is read: one-sided or two-sided
     # SI; None if nothing is published, or it cannot be compared. The worse end of a range
     value: float | None = None
     reason: str | None = None  # how it was converted, or the reason without a value
@@ -76,7 +76,7 @@ class PrintedAxis:
         return cls(sheet, datasheet.options, quantity, axis)
 
     def si(self, name: str) -> Callable[[float, PrintedFigure], float]:
-        """Return the SI conversion of a figure that needs no other conversion."""
+        """Return a function that converts a number of a printed figure to SI by its unit only."""
         (dimension,) = FIGURE_DIMENSIONS[self.quantity][name]
         return lambda value, figure: convert_to_si(value, figure.unit or "", dimension)
 
@@ -87,8 +87,9 @@ class PrintedAxis:
         convert: Callable[[float, PrintedFigure], float],
         figures: Sequence[PrintedFigure] | None = None,
     ) -> list[Comparable]:
-        """Return the printed figures of a name for the axis, as copies of ``like``.
+        """Return the figures of a name for this axis, as copies of ``like`` with values.
 
+        ``convert`` gives values in SI; ``figures`` are by default all printed under this name.
         Figures of options that are not logged are returned only if there are no others.
         """
         listed = [
@@ -144,7 +145,7 @@ class PrintedAxis:
         return None
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
-        """Return the row of a quantity without a printed figure."""
+        """Return ``like`` with the reason why no figure of these names is printed."""
         looked_up = any(self.sheet.looked_up(name) for name in names)
         return replace(like, reason=texts.unpublished(looked_up=looked_up), looked_up=looked_up)
 
@@ -187,8 +188,8 @@ def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
-    The offset is always yielded, the others if published. Only the temperature coefficient is
-    comparable with a log; the rest have an obstacle.
+    The offset is always yielded, other figures if they are published. Of these others, only the
+    temperature coefficient is comparable with a log.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)

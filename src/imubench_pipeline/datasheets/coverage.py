@@ -36,11 +36,11 @@ KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "full_scale": (("full_scale",), ()),
     "bandwidth": (("bandwidth",), ()),
 }
-"""Figures that a filter or a choice needs: keys that give them, and in another convention."""
+"""Keys of a datasheet that give each figure, and keys that give it in another convention."""
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[CoverageRow]:
-    """Return a row for each sensor that is sold, quantity that it measures, and figure."""
+    """Return a row per sold sensor, quantity and figure: whether the figure is published."""
     rows = []
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet
@@ -103,7 +103,7 @@ def by_vendor(rows: Iterable[CoverageRow]) -> list[VendorCoverageRow]:
 
 
 def format_figure(figure: PrintedFigure) -> str:
-    """Return value, unit, kind and qualifiers of a figure."""
+    """Return value, unit, kind and qualifiers of a figure as text."""
     value, numbers = figure.value, ""
     if isinstance(value, dict):
         numbers = ", ".join(f"{axes} {number:g}" for axes, number in value.items())

@@ -38,7 +38,7 @@ _MAX_NORM_ERROR_AT_REST = 0.15
 
 
 def get_measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return the estimate of the statistic that a printed figure is compared with, SI.
+    """Return the measured value with limits that a printed figure is compared with, SI.
 
     Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, over the averaging times
     tau, s, shape (m,). The limits of any other point of the curve are at least as wide as 95 %: all
@@ -96,8 +96,8 @@ def compute_fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
 
     For a gyro it is the magnitude of the mean, which includes the Earth's rotation. For a vertical
     accelerometer axis it is the norm of the three axes less standard gravity. On any other axis, a
-    bias cannot be distinguished from a tilt. The limits are the uncertainty of the Earth's rate or
-    gravity.
+    bias cannot be distinguished from a tilt. The limits allow for the unknown part of the Earth's
+    rate, or of gravity.
     """
     if channel.startswith("gyro"):
         return _bound_size(means[channel], EARTH_RATE, texts.EARTH_RATE_IN_MEAN)
@@ -181,8 +181,8 @@ def deltas(
 ) -> Iterator[Delta]:
     """Compare an estimate, SI, with a datasheet: one row for each interpretation of its figures.
 
-    tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
-    minimum. The tolerance is the relative difference that still counts as printed.
+    ``tau``, shape (m,), s, are the averaging times at which the curve is accurate enough to find
+    its minimum. ``tolerance`` is the largest relative difference with the verdict ``as printed``.
     """
     for entry in read_comparables(datasheet, channel):
         yield compare(entry, get_measured(entry, estimate, tau), tolerance)
@@ -198,9 +198,9 @@ def bias_deltas(
     """Compare the fixed bias of a recording and its temperature sensitivity with the datasheet.
 
     The rows are the offset; the temperature coefficient, if one is printed; and the printed figures
-    of repeatability and temperature that cannot be compared with one log. ``means``: of every
-    channel of the recording, rad/s or m/s²; ``tolerance``: relative difference that still counts as
-    printed; ``sensitivity``: of `compute_sensitivity`, None without readings of the temperature.
+    of repeatability and temperature that cannot be compared with one log. ``means`` has the mean of
+    every channel of the recording, rad/s or m/s². ``tolerance`` is as in `deltas`. ``sensitivity``
+    is the result of `compute_sensitivity`, None without readings of the temperature.
     """
     bias = compute_fixed_bias(channel, means)
     for entry in read_bias_comparables(datasheet, channel):

@@ -41,8 +41,8 @@ tactical ones, and 20 °/s for others."""
 
 _OFFSET_FACTOR_OF_KIND = {"max": 1.5}
 _OFFSET_FACTOR_OF_TYPICAL = 4.0
-"""Maximum offset over the printed one: if typ and max are both printed, max is three times typ, and
-mounting adds to it."""
+"""Maximum ratio of an offset to the printed one: if typ and max are both printed, max is three
+times typ, and mounting adds to it."""
 
 MIN_RATE, MIN_RATE_STATED, _MAX_RATE = 1.05, 0.105, 1e4
 """Limits of the sampling rate of any log, Hz. Stamps in ms that are read as s give at most 1 Hz for
@@ -53,8 +53,8 @@ MIN_RATE_OF_NOISE = 25.0
 
 _MAX_LOG_RATE_PER_BANDWIDTH = 100.0
 _MAX_SAMPLING_RATE_PER_BANDWIDTH = 10.0
-"""Maximum rate of a log, and of a sensor, over the printed bandwidth. The sensors of the shipped
-sensor files are sampled at 2 to 8 times their bandwidth."""
+"""Maximum rate of a log, and of a sensor, divided by the printed bandwidth. The sensors of the
+shipped sensor files are sampled at 2 to 8 times their bandwidth."""
 
 _USUAL_RATE = 100.0
 _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
@@ -112,7 +112,7 @@ class Expected:
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
-    """Return the usual levels of a quantity of a sensor, from its file if it prints them."""
+    """Return the usual levels of a quantity: by the sensor's file, else of any such sensor."""
     usual = _USUAL_GYRO_DENSITY if quantity == "gyro" else None
     if sensor is None:
         return Expected(usual)
@@ -197,11 +197,11 @@ def implausible(
     static: bool = True,
     moved: bool = False,
 ) -> list[Finding]:
-    """Return the findings that contradict a static sensor with data in the stated units.
+    """Return findings on data that are implausible for a static sensor in the stated units.
 
     They are based on the levels of each channel, on the rotation of gravity relative to the sensor,
-    and on the sensor file. ``static``: the sensor should be at rest. ``moved``: it was not, so that
-    neither noise nor mean says anything about units.
+    and on the sensor file. ``static``: the sensor should be at rest. ``moved``: it was moved, so
+    that noise and means are not checked.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level.rate for name, level in channels.items()}
@@ -257,7 +257,7 @@ def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
-    """Yield the units that may be meant instead of one, and the factor that corrects the data."""
+    """Yield units that may be meant instead of ``unit``, with the factor that corrects data."""
     dimension = QUANTITIES[quantity]
     stated = find_conversion(unit, dimension)[0]
     for other in _LOGGER_UNITS[quantity]:

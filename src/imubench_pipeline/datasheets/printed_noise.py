@@ -1,4 +1,4 @@
-"""The noise of a sensor by its datasheet, with the class where the datasheet is silent.
+"""The noise of a sensor by its datasheet, and by its class where the datasheet prints nothing.
 
 A density of unknown sidedness counts as N itself. B follows from the printed minimum of the Allan
 deviation, as flicker noise.
@@ -36,7 +36,7 @@ class PrintedNoise:
 
 
 def read_printed_noise(sensor: Sensor, quantity: str) -> PrintedNoise:
-    """Return the noise of a quantity that the sensor measures."""
+    """Return the noise models of a quantity that the sensor measures, by its datasheet."""
     values: dict[str, Mapping[End, float]] = {}
     assumed = set()
     for figure in ("N", "B"):

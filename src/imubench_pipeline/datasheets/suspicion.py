@@ -29,7 +29,7 @@ _MAX_FACTOR_BEYOND_CATALOGUE = 2.0
 
 @dataclass(frozen=True)
 class Usual:
-    """Usual range of a figure."""
+    """The range of a figure among the sensors of a catalogue."""
 
     # median, least, most: SI
     median: float
@@ -122,7 +122,7 @@ def suspicious(
 def unusual_rows(
     parameters: Iterable[ParameterRow], sensors: Mapping[str, Sensor], usual: UsualFigures
 ) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` about estimates far from the printed figures."""
+    """Yield rows of ``findings`` about estimates far from all printed figures."""
     for row in parameters:
         # Vendors print the minimum of the Allan deviation as B.
         figure = {"N": "N", "sigma_min": "B"}.get(row.parameter)

@@ -7,11 +7,11 @@ transformed: it has no limits, and all its scatter is spread.
 mu and tau are estimated from a level, the recordings since the last change, weighted by
 1 / (v + tau^2), with tau^2 the excess of the squared residuals over the errors v (method of moments
 of DerSimonian and Kacker). From 8 recordings on, residuals are from a straight line: otherwise a
-slow drift would increase tau and never be detected. The distance of the next estimate from mu, over
-the root of v + tau^2 + var mu, follows Student's t with Satterthwaite's degrees of freedom.
+slow drift would increase tau and never be detected. The distance of the next estimate from mu,
+divided by sqrt(v + tau^2 + var mu), follows Student's t, with degrees of freedom by Satterthwaite.
 
-A recording is ``changed`` if p is below `SIGNIFICANCE_LEVEL` over its number of tests (Bonferroni),
-and begins a new level. If the next recording is nearer to the old level, the flagged one was an
+A recording is ``changed``, and begins a new level, if p is below `SIGNIFICANCE_LEVEL` / number of
+tests (Bonferroni). If the next recording is nearer to the old level, the flagged one was an
 outlier. Fewer than three recordings do not determine tau, and nothing is tested. With 42 tests, the
 smallest flagged change, in standard deviations, is 75 after 3 recordings; 6.6 after 10; 4 after 50.
 
@@ -90,7 +90,7 @@ def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Or
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
-    """Yield devices with two or more recordings of status ``ok``; simulated ones separately."""
+    """Yield a series per device with two ``ok`` recordings or more; simulated ones are apart."""
     groups: dict[tuple[str, str, bool], list[RecordingRow]] = {}
     for row in recordings:
         if row.status == "ok":

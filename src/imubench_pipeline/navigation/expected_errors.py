@@ -53,14 +53,14 @@ class AxisErrors:
     best: NoiseModel | None = None
 
     def at(self, end: End) -> "AxisErrors":
-        """Return the sources with other figures of the class in place of its worst ones."""
+        """Return the sources with the likely or best figures of the class, not the worst."""
         model = {"in_use": None, "likely": self.likely, "best": self.best}[end]
         figures = {cause: figure.at(end) for cause, figure in self.figures.items()}
         return AxisErrors(model or self.model, figures)
 
     @property
     def noise(self) -> "AxisErrors":
-        """Its noise alone."""
+        """The same axis with only its noise."""
         return AxisErrors(self.model)
 
 
@@ -72,7 +72,7 @@ _NO_ERRORS = {"gyro": _NO_AXIS_ERRORS, "accel": _NO_AXIS_ERRORS}
 
 @dataclass(frozen=True)
 class Question:
-    """One error to be computed."""
+    """An error to be computed: which error, when, how it starts, and for which axis."""
 
     requirement: str | None  # name of the requirement; None for the standard times
     error: Error
@@ -87,23 +87,23 @@ class Question:
 
     @property
     def needs(self) -> tuple[Measured, ...]:
-        """Quantities that are needed to compute it."""
+        """Quantities, ``gyro`` and ``accel``, that the error depends on."""
         return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget for these axes."""
+        """Return the error budget with these axes of a gyro and an accelerometer."""
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).heading(self.time)
         return self._after(self.time, gyro, accel)
 
     def answer_all(self, gyro: AxisErrors, accel: AxisErrors) -> tuple[Budget, float, float, float]:
-        """Return the budget, and the totals of noise alone, likely, and best of the class."""
+        """Return the budget, and totals with only noise, and with likely and best class figures."""
         likely, best = (self.answer(gyro.at(end), accel.at(end)).total for end in _OTHER_ENDS)
         noise = self.answer(gyro.noise, accel.noise).total
         return self.answer(gyro, accel), noise, likely, best
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
-        """Return the time at which the limit is reached, s; for north, the static time needed."""
+        """Return the time, s, at which the limit is reached (north: time at rest), or None."""
         if self.limit is None:
             return None
         if self.error == "north":
@@ -163,7 +163,7 @@ _OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
-    """Yield the standard questions; times and window in s, the latitude for north in rad."""
+    """Yield every error at each time, for each axis; times and window in s, latitude in rad."""
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
     for axis in axes:
@@ -174,7 +174,7 @@ def list_standard_questions(
 
 
 def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[Question]:
-    """Yield the questions of a requirement."""
+    """Yield the error to compute for each limit of a requirement in dead reckoning."""
     latitude = requirement.latitude
     if requirement.static_window is not None:
         start = Start.calibrated(parse_quantity(requirement.static_window, "time"))
@@ -223,10 +223,10 @@ def list_error_rows(
 ) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
-    ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
-    ``draws`` the number of noise models that are drawn from each, for the interval of a total.
-    Each channel has its own random stream of the seed. ``figures`` belong to the errors in use,
-    by channel, and by quantity for a recording without it (`in_use.collect_figures_in_use`).
+    ``names`` has ``sensor`` and ``recording``. ``estimates`` has the recommended estimate of each
+    channel, from which ``draws`` noise models are drawn for the interval of a total. Each channel
+    has its own random stream of the seed. ``figures`` are errors other than noise, by channel, and
+    by quantity for a recording without the quantity (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
     without = {q: AxisErrors(figures=figures.get(q, in_use.NO_FIGURES)) for q in MEASURED}
@@ -383,10 +383,11 @@ def _add_figures(
 def find_largest_figures(
     nominal: Budget, limit: float | None, upper: float
 ) -> dict[ErrorSource, float]:
-    """Return the largest figures, SI, with which a limit is met, instead of limits of the class.
+    """Return the largest figures, SI, with which a limit is met, in place of class limits.
 
-    The figures that leave no room for others share the room equally; it is 0 if the other sources
-    exceed the limit, with the upper limit of the total, ``upper``, if that is below the limit.
+    The variance below the limit that other sources leave is divided equally; figures are 0 if none
+    is left. Sources that need less with their class limit are omitted. The other sources include
+    the uncertainty of the total, up to its limit ``upper``, unless they then exceed the limit.
     """
     parts = [
         part
@@ -414,7 +415,7 @@ def find_largest_figures(
 def collect_axis_errors(
     estimates: Mapping[str, Estimate], figures: Mapping[str, in_use.Figures]
 ) -> dict[str, AxisErrors]:
-    """Return the error sources of the axes with a noise model: the noise of others is not 0."""
+    """Return the error sources of axes with a noise model; axes with unknown noise are omitted."""
     return {
         channel: AxisErrors(estimate.model, figures.get(channel, in_use.NO_FIGURES))
         for channel, estimate in estimates.items()
@@ -435,7 +436,7 @@ def draw_axis_errors(
 def select_channels(
     question: Question, axes: Mapping[str, AxisErrors]
 ) -> dict[Measured, str | None] | None:
-    """Return the gyro and accelerometer channels to use; None if one of them is missing."""
+    """Return the channel of each quantity, the worst or the median axis; None if one is missing."""
     chosen: dict[Measured, str | None] = {"gyro": None, "accel": None}
     # Accelerometers level a gyro for north, if they are recorded.
     for quantity in MEASURED if question.error == "north" else question.needs:
@@ -498,8 +499,8 @@ def list_growth_rows(
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
-    They are for its worst axes, and if it has several, for each letter alone. ``times`` and
-    ``window``, s, are used in addition to the default times; the others are as in
+    They are for the worst axes, and for each of x, y and z if the recording has several. ``times``
+    and ``window``, s, are used in addition to the default times. The other arguments are as in
     `list_error_rows`.
     """
     axes = collect_axis_errors(estimates, figures)

@@ -81,9 +81,9 @@ def pool(
 ) -> Pool:
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
-    tau is the estimate of Paule and Mandel, Q(tau^2) = K - 1; its limits are from the Q-profile
-    method of Viechtbauer. ``values``, ``lower``, ``upper``, shape (K,), are estimates in any one
-    unit with their 95 % limits; one counts if 0 < lower < value < upper < infinity.
+    tau is the estimate of Paule and Mandel, Cochran's Q(tau^2) = K - 1; its limits are from the
+    Q-profile method of Viechtbauer. ``values``, ``lower``, ``upper``, shape (K,), are estimates in
+    any one unit with their 95 % limits. They are used if 0 < lower < value < upper < infinity.
     """
     triples = list(zip(values, lower, upper, strict=True))
     used = [triple for triple in triples if is_usable(triple)]
@@ -147,7 +147,7 @@ def _compute_quantiles(freedom: int) -> tuple[float, float, float]:
 
 
 def centre_on_median(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
-    """Return the median of ln value, and the points about it, ascending."""
+    """Return the median of ln value, and the points relative to it, in ascending order."""
     logs = sorted((math.log(v), math.log(low), math.log(high)) for v, low, high in used)
     middle = logs[len(logs) // 2][0]  # subtracted, to keep the precision of narrow limits
     points = []
@@ -203,10 +203,10 @@ def _solve_spread_squared(points: list[_Point], target: float) -> float:
 
 
 def estimate_turn_on_bias(means: Iterable[float | None]) -> Pool:
-    """Return the fixed bias over recordings, and its spread: d(u) in equation 1 of Maia et al.
+    """Return the mean fixed bias and its spread between recordings: d(u), Maia et al., equation 1.
 
-    The limits of the mean are by Student's t, of the spread by the chi-squared distribution of
-    (K - 1) s^2 / sigma^2. The spread includes slow noise and changes of tilt. The means are in
+    The limits of the mean are by Student's t; the limits of the spread are by the chi-squared
+    distribution of (K - 1) s^2 / sigma^2. It includes slow noise and changes of tilt. Means are in
     rad/s or m/s^2; None and NaN are left out.
     """
     listed = list(means)
@@ -240,12 +240,12 @@ def list_pooled_rows(
 ) -> Iterator[PooledRow]:
     """Yield the rows of the table ``pooled``.
 
-    There is one row (device None) for each sensor with two recordings or more, and if it has
-    several devices, one for each device with two or more. Parameters are `POOLED_PARAMETERS`, from
-    recommended rows of component 1, and ``bias``, which has no verdict. The spread of a noise
-    parameter is ``value`` times tau (see `Pool`). A parameter that only some recordings have is
-    never ``agree``; recordings without T_B do not count for it. A recording that ``devices`` does
-    not list is its own device.
+    For each channel and parameter, each sensor with two recordings or more has one row (device
+    None). If it has several devices, each device with two recordings or more also has one.
+    Parameters are `POOLED_PARAMETERS`, from recommended rows of component 1, and ``bias``, without
+    a verdict. The spread of a noise parameter is ``value`` times tau (see `Pool`). A parameter
+    that only some recordings have is never ``agree``, except T_B. A recording that ``devices`` does
+    not list is a separate device.
     """
     # By channel, parameter and recording; the key "" lists every recording, with or without it.
     estimates: dict[tuple[str, str], dict[str, dict[str, ParameterRow | None]]] = {}

@@ -36,9 +36,9 @@ _MIN_RELEVANT_SHARE = 0.1
 def compute_number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
     """Return the number of sensors of one kind whose mean has a given Allan variance.
 
-    The mean of n sensors has ``own / n + common``. n is not rounded, may be below 1, and is
-    infinite if no number is enough. Allan variances of the independent and of the common part, and
-    the wanted one, all of shape (n,) or scalars, are in (rad/s)^2 or (m/s^2)^2.
+    The mean of n sensors has the Allan variance ``own / n + common``, which is to be ``wanted``.
+    n is not rounded, may be below 1, and is infinite if no number is enough. The arguments are
+    scalars or arrays of one shape, in (rad/s)^2 or (m/s^2)^2.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)
@@ -51,7 +51,7 @@ class TemperaturePart:
 
     tau: Array  # shape (t,); s
     deviation: Array  # shape (t,); its Allan deviation over the recording, (rad/s) or (m/s²)
-    relative_error: float  # standard deviation of the sensitivity over its value
+    relative_error: float  # standard deviation of the sensitivity divided by its value
 
     def variance(self, tau: float) -> float:
         """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
@@ -66,14 +66,14 @@ class TemperaturePart:
 
 @dataclass(frozen=True)
 class ComparedChannel:
-    """A channel that may represent its sensor."""
+    """A channel with its estimate, for comparisons with channels of other logs."""
 
     sensor: str
     recording: str
     channel: str
     simulated: bool
     duration: float  # of the recording, s
-    # the recommended one, after removal of the temperature effect, if any
+    # the recommended estimate, after removal of the temperature effect, if any
     estimate: Estimate
     temperature: TemperaturePart | None = None  # removed temperature effect
     # loads the joint draws, if the estimate does not contain them: in a run, they are read only for
@@ -131,7 +131,7 @@ _TAUS_PER_DECADE = 2  # number of tau per decade in the table ``drawn_deviations
 
 @dataclass(frozen=True)
 class Ratio:
-    """Ratio of two logs, the first over the second."""
+    """Ratio of a value of the first log to the value of the second log."""
 
     value: float | None  # None: one of them has no value
     # 95 % limits; None: unbounded above, or not known
@@ -141,7 +141,7 @@ class Ratio:
 
     @property
     def verdict(self) -> RatioVerdict:
-        """How the first compares with the second, from the interval alone."""
+        """Whether the interval shows that the first value is lower or higher than the second."""
         if self.upper is not None and self.upper < 1.0:
             return "lower"
         if self.lower is not None and self.lower > 1.0:
@@ -153,7 +153,7 @@ class Ratio:
 def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
     """Return the ratio of one noise parameter of two logs (Zou and Donner 2008, eq. 2 and 3).
 
-    If one has limits but no value, the interval contains all quotients within the limits.
+    If a parameter has limits but no value, the interval contains all quotients within the limits.
     """
     reasons = tuple(
         texts.operand_status(which, parameter.status)
@@ -247,8 +247,8 @@ def list_deviation_rows(
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
     They are the input of `compare_deviations`, at two tau a decade from the sampling interval on,
-    so that any two channels can be compared without their logs. ``rate`` is in Hz; the others are
-    as in `compare_deviations`.
+    so that any two channels can be compared without their logs. ``rate`` is in Hz; the other
+    arguments are as in `compare_deviations`.
     """
     if not channel.model.terms:
         return

@@ -11,10 +11,10 @@ from imubench_pipeline.navigation.verdicts.standing import Standing
 
 
 def rank_sensors(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
-    """Yield the rows of the table ``ranking``, from the judgements and their recordings.
+    """Yield the rows of the table ``ranking``, from judgements and the basis of all recordings.
 
-    The rank of a sensor is one more than the number of significantly better ones: the interval of
-    their margin lies wholly above its own.
+    The rank of a sensor is 1 plus the number of significantly better sensors: they meet the limits
+    and it does not, or else the 95 % interval of their margin lies wholly above its interval.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]

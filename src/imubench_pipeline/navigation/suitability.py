@@ -28,7 +28,7 @@ _ROUNDING_MARGIN = 1.0 + 1e-9
 class Abilities(Strict):
     """Properties of a sensor, SI; None if not known."""
 
-    # full_scale, bandwidth: the largest fixed or selectable one, by quantity; rad/s, m/s^2, Hz
+    # full_scale, bandwidth: largest fixed or selectable value, by quantity; rad/s, m/s^2, Hz
     full_scale: dict[Measured, float] = Field(default_factory=dict)
     bandwidth: dict[Measured, float] = Field(default_factory=dict)
     # logged_rate, rate: rate of its logs, and its highest rate, Hz
@@ -96,7 +96,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(requirement: Requirement, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
-    """Return the required properties that a sensor lacks, and the unknown ones."""
+    """Return the required properties that a sensor lacks, and others that are not known."""
     points: dict[tuple[Property, str], tuple[bool | None, Shortfall]] = {}
     for fulfilled, point in _compare(requirement, has):
         points.setdefault((point.property, point.subject), (fulfilled, point))
@@ -178,20 +178,20 @@ class Conditions:
 
     shortfalls: tuple[Shortfall, ...]
     unknown: tuple[Condition, ...]  # demanded properties that are not known
-    # figures that are not known, by quantity and cause: the largest one within every limit, SI
+    # largest value with which all limits are met, SI, of each unknown figure, by quantity and cause
     figures: Mapping[tuple[str, Cause], float]
 
     @classmethod
     def of(
         cls, requirement: Requirement, has: Abilities, conditions: Iterable[ErrorBudgetRow]
     ) -> "Conditions":
-        """Return the conditions; ``conditions``: budget rows with too large class limits."""
+        """Return all conditions; ``conditions`` are budget rows with too large class limits."""
         lacking, unknown = judge(requirement, has)
         largest = merge_largest((row.quantity, row.source, row.largest) for row in conditions)
         return cls(tuple(lacking), tuple(unknown), largest)
 
     def judge(self, verdict: Verdict) -> tuple[Verdict, tuple[Condition, ...]]:
-        """Return the verdict, and the conditions on which it holds."""
+        """Return the final verdict and its conditions, from the verdict on the errors."""
         if self.shortfalls:
             return "excluded", ()
         if verdict == "meets_if":
@@ -202,7 +202,7 @@ class Conditions:
 
 
 def make_figure_conditions(figures: Mapping[tuple[str, Cause], float]) -> tuple[Condition, ...]:
-    """Return the conditions that figures are at most so large, SI, by quantity and cause."""
+    """Return the conditions that figures do not exceed these values, SI, except values of 0."""
     return tuple(
         Condition(cause, None, quantity, size, *count_sensors_within(quantity, cause, size))
         for (quantity, cause), size in figures.items()
@@ -213,7 +213,7 @@ def make_figure_conditions(figures: Mapping[tuple[str, Cause], float]) -> tuple[
 def merge_largest(
     figures: Iterable[tuple[str | None, SourceCode, float | None]],
 ) -> dict[tuple[str, Cause], float]:
-    """Return the least of the largest figures, by quantity and cause."""
+    """Return the smallest of the permitted values of each figure, by quantity and cause."""
     merged: dict[tuple[str, Cause], float] = {}
     for quantity, source, size in figures:
         if quantity and size and source in _CAUSES:
@@ -226,12 +226,12 @@ _CAUSES = get_args(Cause)
 
 
 def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
-    """Return the rows with a figure, each with its standard deviation."""
+    """Return the rows with a known standard deviation, each as a pair of row and deviation."""
     return [(row, row.sigma) for row in rows if row.sigma is not None]
 
 
 def compute_variance_shares(total: float, sources: Iterable[ErrorBudgetRow]) -> tuple[Share, ...]:
-    """Return the sources with at least 1 % of the variance, the largest first."""
+    """Return the sources with 1 % or more of the variance ``total``^2, the largest first."""
     if total <= 0.0:
         return ()
     shares = (

@@ -26,7 +26,7 @@ _FILTERS = ("vendor", "grade", "technology")
 def make_catalogue_tables(
     covered: Sequence[CoverageRow], rows: Iterable[CatalogueRow], system: System
 ) -> Iterator[Json]:
-    """Yield a table per quantity with a line per sensor and a column per figure."""
+    """Yield a table of datasheet figures per quantity: a line per sensor, a column per figure."""
     printed: dict[tuple[str, str, str], list[CatalogueRow]] = {}
     about = {}
     for one in rows:
@@ -133,7 +133,7 @@ def _describe_source(row: CatalogueRow) -> str:
 
 
 def format_counts(published: Iterable[str]) -> str:
-    """Return how many sensors publish a figure, and for how many it was not looked up."""
+    """Return how many sensors publish a figure as text, such as ``5 of 8 (not checked: 2)``."""
     counts = Counter(published)
     unknown = counts["not looked up"]
     text = f"{sum(counts[one] for one in _PUBLISHED)} of {counts.total() - unknown}"
@@ -148,7 +148,7 @@ def _make_share(rows: Sequence[CoverageRow]) -> Json:
 
 
 def compare_with_paper(rows: Sequence[CoverageRow]) -> str:
-    """Return the claim of Maia et al. on documentation, with the numbers of the catalogue."""
+    """Return how the catalogue supports Maia et al., who find datasheets incomplete, in words."""
     found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         published = found.setdefault((row.sensor, row.quantity), [])

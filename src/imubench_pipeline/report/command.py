@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the report; return the exit status: 2 if there are no results."""
+    """Write the report; return 1 if a page failed, else 0. Raises CommandError without results."""
     # Imported here, because templates and figures take half a second to load.
     with require_extra("workflow", "write the report"):
         from imubench_pipeline.report.publish import load_site
@@ -54,14 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
     except FileNotFoundError as error:
         raise CommandError(
             f"{arguments.results}: found no {Path(error.filename).name}; expected the results of a "
-            "finished run: run snakemake -c2 first"
+            "finished run; run snakemake -c2 first"
         ) from None
     except ValueError as error:
         raise CommandError(str(error)) from None
     if lost := list_missing_inputs(arguments.results, "report"):
         raise CommandError(
-            f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for "
-            "these results, and it is made anew"
+            f"{arguments.results / lost[0]}: missing, and the report needs it; run snakemake -c2 "
+            "again, with the same options as for these results, to make it again"
         )
     try:
         _write(site, arguments)
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
 def list_drawings(
     tables: "Mapping[str, pa.Table]", system: "System", folder: Path, **kinds: Sequence[str]
 ) -> Sequence[Callable[[], None]]:
-    """Return functions that write the figures for print; none without their extension."""
+    """Return functions that each write a figure for print; none without the extension figures."""
     return [one for made in _DRAWINGS.objects() for one in made(tables, system, folder, **kinds)]
 
 

@@ -19,7 +19,7 @@ _PAPERS_METHOD = "likelihood_gm"
 
 
 def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
-    """Return the parameters of the papers' model, and others that were estimated, but N_sensor."""
+    """Return the symbols of N, B, T_B and K, and of other estimated parameters except N_sensor."""
     estimated = {row.parameter for row in rows if row.status != "absent"}
     return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
 
@@ -27,7 +27,7 @@ def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
 def make_methods_table(
     channel: ChannelView, duration: float | None, system: System
 ) -> tuple[list[str], list[payload.Json]]:
-    """Return the symbols, and one line per method; also the true parameters of a simulation."""
+    """Return the symbols (columns) and a line per method; the last has the truth if simulated."""
     symbols = select_symbols(chain(*channel.parameters.values()))
     lines: list[payload.Json] = [
         {
@@ -51,7 +51,7 @@ def make_methods_table(
 
 
 def describe_model(channel: ChannelView, method: str) -> str:
-    """Return the model of a method, and how many other models its intervals include."""
+    """Return the model of a method, such as ``N+GM+K (4 other models fit as well)``."""
     text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:
         return text
@@ -68,7 +68,7 @@ def describe_model(channel: ChannelView, method: str) -> str:
 def make_parameter_cell(
     channel: ChannelView, method: str, symbol: str, duration: float | None, system: System
 ) -> payload.Json:
-    """Return a cell with a part for each component: its value, interval and status."""
+    """Return the table cell of a parameter (value, interval, status); ``duration`` is in s."""
     unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     rows = [row for row in rows if row.status != "absent"] or rows
@@ -102,16 +102,16 @@ def _cell(parts: Sequence[payload.Json], words: str, digits: int) -> payload.Jso
 
 @dataclass(frozen=True)
 class ComparedRecording:
-    """The compared data of a recording, gathered once for all pages."""
+    """The data of a recording that pages compare with others, gathered once for all pages."""
 
     view: RecordingView
     channels: list[payload.ComparedChannel]
-    datasheet: Mapping[str, list[payload.Json]]  # its lines, by channel
-    lines: Mapping[str, list[payload.Json]]  # of the tables of parameters, by quantity
+    datasheet: Mapping[str, list[payload.Json]]  # lines in the Allan plot, by channel
+    lines: Mapping[str, list[payload.Json]]  # lines of the tables of parameters, by quantity
 
 
 def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
-    """Gather the compared data of a recording; ``system`` has the units of its numbers."""
+    """Return the data of a recording that pages compare; ``system``: the units in its texts."""
     channels = view.channels()
     lines: dict[str, list[payload.Json]] = {name: [] for name in QUANTITY_NAMES}
     for channel in channels:
@@ -141,7 +141,7 @@ def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
 
 
 class Comparison:
-    """The compared data of recordings; ``names`` are the names of sensors on the pages."""
+    """The data of recordings that a page compares; ``names`` has the shown name of each sensor."""
 
     def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names
@@ -159,7 +159,7 @@ class Comparison:
 
     @property
     def page(self) -> payload.Json:
-        """The data of the figures of the page."""
+        """The data for the scripts that draw the figures of the page."""
         return {
             "channels": self.channels,
             "datasheets": self._datasheets,
@@ -167,7 +167,7 @@ class Comparison:
         }
 
     def tables(self) -> Iterator[payload.Json]:
-        """Yield a table per quantity, with the recommended method and the papers' model."""
+        """Yield a table of parameters per quantity, by the recommended method and with N+GM+K."""
         for quantity, lines in self._lines.items():
             if not lines:
                 continue

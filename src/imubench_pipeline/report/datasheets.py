@@ -32,7 +32,10 @@ _WITHOUT_METHOD = ("mean", "temperature")
 def compare_with_datasheet(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[Json]:
-    """Yield each printed figure with its interpretations, the measured value and a verdict."""
+    """Yield a line per figure of a datasheet: the printed and measured values, and the verdict.
+
+    ``coverage`` states whether a figure is published, by sensor, quantity and figure.
+    """
     own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
     for rows in _group_by_figure(own).values():
         first = rows[0]
@@ -73,10 +76,10 @@ def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[Datashe
 
 
 def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
-    """Return the verdict on a printed figure from the rows of its interpretations, and its reason.
+    """Return the verdict on a printed figure, and the reason, from a row per interpretation.
 
-    A bias instability is judged by the minimum of the curve, as vendors print it. A density of
-    unknown sidedness has a verdict only if both readings have the same.
+    A bias instability is judged by the minimum of the curve, as vendors print it. If a density may
+    be one-sided or two-sided and the two verdicts differ, the verdict is `DEPENDS`.
     """
     minima = [row for row in readings if row.statistic == "adev_minimum"]
     judged = minima or list(readings)
@@ -93,7 +96,7 @@ DEPENDS = "depends on whether the density is one-sided"
 def compare_sensors_with_datasheets(
     views: Sequence[RecordingView], system: System
 ) -> Iterator[Json]:
-    """Yield each printed figure of a channel against all recordings of the sensor."""
+    """Yield a line per printed figure and channel: the range measured in the recordings."""
     groups: dict[tuple[str, bool, _Figure], list[list[DatasheetRow]]] = {}
     for view in views:
         recommended = view.recommended()
@@ -157,7 +160,7 @@ def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
 def format_repeatability(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[Json]:
-    """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure."""
+    """Yield, per device and channel, the scatter of biases between logs, measured and printed."""
     for row in rows:
         if row.sensor != sensor:
             continue

@@ -12,7 +12,7 @@ _FAILED_PAGES_FILE = "failed_pages.json"
 
 
 def read_failed_pages(folder: Path) -> dict[str, str]:
-    """Return the failed pages of a report, with the reasons."""
+    """Return the reason for each page of a report that could not be made, by path."""
     return _read_failed(folder)[1]
 
 
@@ -23,7 +23,7 @@ def count_attempt(folder: Path) -> int:
 
 
 def write_failed_pages(failed: Mapping[str, str], folder: Path) -> None:
-    """Write the names of failed pages, with the reasons."""
+    """Write the paths and reasons of failed pages into the folder; without any, remove the file."""
     if failed:
         content = {"attempt": count_attempt(folder), "pages": dict(failed)}
         write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED_PAGES_FILE)
@@ -51,9 +51,9 @@ def list_report_files(folder: Path) -> list[Path]:
 
 
 def find_drop_zone(results: Path) -> Path | None:
-    """Return the drop zone of the last run by the settings in its report; None if not known.
+    """Return the folder of logs of the last run, from the settings in its report; None if unknown.
 
-    Relative paths count from the folder of the run, if ``results`` has its name of that time.
+    A relative path is below the folder of the run, which is unknown if ``results`` was renamed.
     """
     try:
         settings = json.loads((results / "report/settings.json").read_text("utf-8"))

@@ -25,8 +25,6 @@ _NAMES: Mapping[str, str] = {
 
 
 class _Entry(Strict):
-    """A term in the file."""
-
     name: str | None = None
     short: str
     action: str | None = None
@@ -38,17 +36,17 @@ class _Sections(RootModel[dict[str, dict[str, _Entry]]]):
 
 @dataclass(frozen=True)
 class Term:
-    """A term of the report."""
+    """A term that the report explains, such as a status, a verdict or a finding."""
 
     key: str
     name: str  # as it is shown
     short: str  # one plain sentence: definition and relevance
     section: str  # anchor on the theory page
-    action: str | None = None  # advice, of a finding alone
+    action: str | None = None  # advice; for findings only
 
 
 class UnknownTermError(KeyError):
-    """A term that is missing in the glossary."""
+    """Raised for a key that is not in the glossary."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -65,14 +63,14 @@ class _Glossary(dict[str, Term]):
 def read_glossary() -> dict[str, Term]:
     """Return all terms by key, in the order of the file; do not change them: they are cached.
 
-    An unknown key raises an UnknownTermError with similar terms. Raises ConfigError if the file
-    cannot be used, or a key is in two sections.
+    Looking up an unknown key in the result raises UnknownTermError, with similar keys. Raises
+    ConfigError if the file cannot be used, or a key is in two sections.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
         for key, entry in entries.items():
             if key in terms:
-                raise ConfigError(f"{_FILE}: {key} stands in {terms[key].section} and {section}")
+                raise ConfigError(f"{_FILE}: {key!r} is in {section!r} and above it; remove one")
             anchor = f"finding-{key}" if entry.action else section
             name = entry.name or _NAMES.get(key, key.replace("_", " "))
             terms[key] = Term(key, name, entry.short, anchor, entry.action)
@@ -80,10 +78,10 @@ def read_glossary() -> dict[str, Term]:
 
 
 def find_term(value: str, kind: str = "") -> Term:
-    """Return the term of a value of a table, such as ``not comparable (condition)``.
+    """Return the term that explains a value of a table, such as ``not comparable (condition)``.
 
-    ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
-    (of a printed figure or recording), ``line``, ``axis``, ``rate_from``, ``recording`` (status).
-    Raises UnknownTermError if the glossary does not have it.
+    ``kind`` is a prefix of the key, for values that are ambiguous without it: ``verdict``,
+    ``published``, ``kind`` (of a printed figure or recording), ``line``, ``axis``, ``rate_from``,
+    ``recording`` (status). Raises UnknownTermError if the glossary does not have the term.
     """
     return read_glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

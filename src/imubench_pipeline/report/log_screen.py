@@ -42,27 +42,27 @@ _REMOVED = ("bias_step", "warm_up_drift", "periodic_drift")
 _NOTES = ("slow_sampling", "missing_samples", "lines", "filtered", "noise_grows")
 """Notes that are listed after all warnings, in this order."""
 
-_MIN_LINE = 20.0  # density of a spectral line that is listed, over the noise floor
-_MAX_WAIT = 30.0  # length of a log that is advised for a value, over the present one
+_MIN_LINE = 20.0  # ratio of the density of a listed spectral line to the noise floor
+_MAX_WAIT = 30.0  # ratio of the longest length of a log that is advised to its present length
 _SHARE_UNTIL_IDENTIFIED = 0.02
-"""Of the length that gives ± 10 %: until the limits have a ratio of 4, errors fall as its root."""
+"""Length of a log that gives limits with a ratio of 4, divided by the length for ± 10 %."""
 
-_MAX_EFFECT = 3.0  # of the logarithm of a factor
+_MAX_EFFECT = 3.0  # natural logarithm of a factor
 
 
 @dataclass(frozen=True)
 class Event:
-    """Findings of one recording with one cause."""
+    """The findings in one recording that have the same cause."""
 
     findings: tuple[FindingRow, ...]
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The channels concerned."""
+        """The channels that the findings name, each once."""
         return tuple(dict.fromkeys(row.channel for row in self.findings if row.channel))
 
     def factors(self) -> dict[str, float] | None:
-        """Return by which parameters would change without its removal; None: not measured."""
+        """Return the factor by which each parameter changes if the event remains, or None."""
         largest: dict[str, float] = {}
         measured = False
         for row in self.findings:
@@ -74,11 +74,11 @@ class Event:
         return largest if measured else None
 
     def casts_doubt(self) -> bool:
-        """Return whether any value is doubtful for it."""
+        """Return whether the event makes the estimate of a parameter doubtful."""
         return any(row.severity != "note" and row.affects for row in self.findings)
 
     def score(self) -> float:
-        """Return the importance: first what forbids the use, then by effect and channels."""
+        """Return the importance: 100 or more if the log cannot be used, 0 for a note to ignore."""
         if any(row.severity == "fatal" for row in self.findings):
             return 1000.0
         if any(FINDINGS[row.finding].unfit for row in self.findings):
@@ -102,15 +102,15 @@ def _effect(factor: float) -> float:
 
 
 def group_events(findings: Iterable[FindingRow]) -> list[Event]:
-    """Return the events of a recording that matter; signals without an effect are left out."""
+    """Return the events of a recording with an importance above 0, the most important first."""
     return [one for one in list_events(findings) if one.score() > 0.0]
 
 
 def list_events(findings: Iterable[FindingRow]) -> list[Event]:
     """Return the events of a recording, the most important first, notes last.
 
-    Sudden findings of all channels are one disturbance if less than 30 s lie between them. Other
-    findings are one event if they are of the same kind.
+    Steps in all channels are one event if less than 30 s lie between them. Other findings are one
+    event if they have the same kind and severity.
     """
     sudden: list[FindingRow] = []
     groups: dict[str, list[FindingRow]] = defaultdict(list)
@@ -134,7 +134,7 @@ def list_events(findings: Iterable[FindingRow]) -> list[Event]:
 def render_log_screen(
     tables: Mapping[str, pa.Table], system: System, width: int
 ) -> Iterator[RenderableType]:
-    """Yield the screen of each of a few logs, at most 40 lines each for six axes."""
+    """Yield the parts of the screen of a few logs, for each at most 40 lines for six axes."""
     width = min(width, _MAX_WIDTH)
     every_finding = FindingRow.rows_of(tables["findings"])
     every_parameter = ParameterRow.rows_of(tables["parameters"])

@@ -18,11 +18,11 @@ from imubench_pipeline.words import numbers, verdicts
 
 
 class SourcedNumber(str):
-    """A printed number; in HTML it names its source, a value of the tables.
+    """A number as text, which as HTML also names the value of a table that it comes from.
 
-    ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``. For a total of
-    ``error_budget`` it has the recording after the sensor. Two columns with a colon between them
-    are a ratio. ``unit`` is the unit of the number.
+    ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``. For a total of the
+    table ``error_budget``, the recording follows the sensor. Two columns with a colon, such as
+    ``limit:upper``, are a ratio. ``unit`` is the unit of the number.
     """
 
     __slots__ = ("source", "unit")
@@ -42,7 +42,7 @@ class SourcedNumber(str):
 
 
 class SourcedInterval(str):
-    """Two printed limits; in HTML each names its source."""
+    """An interval as text, such as ``1.7 to 2.4``, whose limits name their sources in HTML."""
 
     __slots__ = ("ends",)
     ends: tuple[SourcedNumber, SourcedNumber]
@@ -65,14 +65,14 @@ _MAX_REASONS = 2  # of an error in a cell; the tables of a run have all
 def source_number(
     row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
-    """Return a number of a row of ``ranking``, or of a total of ``error_budget``."""
+    """Return ``text`` as a number whose source is ``column`` of a row of a table."""
     names = [row.table, row.requirement or "", row.sensor]
     names += [row.recording] if isinstance(row, ErrorBudgetRow) else []
     return SourcedNumber(text, "/".join([*names, row.error, f"{row.time:g}", column]), unit)
 
 
 def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
-    """Return the margin of a row of the table ``ranking`` with its 95 % limits, if there is one."""
+    """Return margin, lower and upper 95 % limit of a row of ``ranking``; None without a margin."""
     if row.margin is None:
         return None
     low, high = compute_margin_limits(row)
@@ -85,7 +85,7 @@ def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, Source
 
 
 def compute_margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
-    """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
+    """Return the 95 % limits of a margin: the limit divided by the 95 % limits of the error."""
     # Infinite where the error is zero, None where it is unknown.
     low, high = (
         None if row.limit is None or error is None else row.limit / error if error else math.inf
@@ -94,7 +94,7 @@ def compute_margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
     return low, high
 
 
-Simulated = Mapping[tuple[str, str], bool]
+Simulated = Mapping[tuple[str, str], bool]  # whether a recording is, by sensor and name
 
 _NAMES = {
     "attitude": "attitude (tilt)",
@@ -116,27 +116,27 @@ _QUARTER_TURN = math.pi / 2.0
 
 @dataclass(frozen=True)
 class LimitLine:
-    """A limit of a requirement, and the error of a sensor, as texts."""
+    """A line of a ranking: a limit of a requirement and the error of a sensor, as texts."""
 
-    limit: str
-    allowed: SourcedNumber
-    sigma: str
-    interval: str
+    limit: str  # error and time
+    allowed: SourcedNumber  # the limit as 1 sigma
+    sigma: str  # expected error
+    interval: str  # of sigma, 95 %
     margin: str
-    margins: str
-    other_margins: str  # of noise alone, and the likely one
-    chance: str
-    source: str
-    parts: Sequence[str]
-    reached: str
-    decides: bool
+    margins: str  # 95 % interval of the margin
+    other_margins: str  # margin of the noise without other errors, and likely margin
+    chance: str  # probability that sigma is within the limit
+    source: str  # largest source of the error, with its share of the variance
+    parts: Sequence[str]  # sources of the error, with their shares of the variance
+    reached: str  # time after which the error reaches the limit
+    decides: bool  # whether this limit gives the verdict
     reason: str
     backtest: str
 
 
 @dataclass(frozen=True)
 class Group:
-    """The lines of a sensor in the ranking for a requirement."""
+    """A sensor in the ranking for a requirement: its verdict, reasons, and a line per limit."""
 
     row: RankingRow  # of the deciding limit
     simulated: bool
@@ -150,14 +150,14 @@ class Group:
 
     @property
     def sensor(self) -> str:
-        """Name of its file."""
+        """Name of the sensor file."""
         return self.row.sensor
 
 
 def format_rankings(
     rows: Sequence[RankingRow], requirements: Iterable[str], simulated: Simulated, system: System
 ) -> Iterator[tuple[str, list[Group]]]:
-    """Yield the name of each requirement, and the sensors in their order for it."""
+    """Yield each requirement with its sensors by rank; sensors without a rank are last."""
     by_requirement = group_rows(rows, lambda row: row.requirement)
     for name in requirements:
         by_sensor = group_rows(by_requirement.get(name, ()), lambda row: row.sensor)
@@ -233,14 +233,14 @@ def _interval(row: ErrorRow, system: System) -> str:
 
 
 def format_recording_error(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
-    """Return the error of a recording and its limits, from a total of ``error_budget``."""
+    """Return the expected error (1σ) and its 95 % interval, from a total of ``error_budget``."""
     if total.sigma is None:
         return "–", ""
     return _expected(total, system), _interval(total, system)
 
 
 def describe_limit(row: RankingRow) -> str:
-    """Return the error and the time of a limit, from a row of ``ranking``."""
+    """Return the error and the time of a limit as text, such as ``heading, 60 s``."""
     drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
     names = _NAMES if row.trajectory else _NAMES_IN_LIMITS
     return f"{names[row.error]}, {numbers.duration_text(row.time)}{drive}"
@@ -282,7 +282,7 @@ def make_budget_tables(
 
 
 def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
-    """Return a bar for each error and time of the worst axes of a recording: its variance."""
+    """Return a bar per error and time of the worst axes, with its sources as shares of variance."""
     own = [row for row in rows if row.requirement is None]
     worst = (row for row in own if row.axis == own[0].axis)
     groups = group_rows(worst, lambda row: (row.error, row.time))
@@ -349,7 +349,7 @@ def _percent(share: float | None) -> str:
 
 
 def explain_budget(settings: Mapping[str, Any]) -> str:
-    """Return an explanation of the budget, from the section ``error_budget`` of the settings."""
+    """Return how the errors are calculated, in words, from the section ``error_budget``."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
         f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "
@@ -362,7 +362,7 @@ def explain_budget(settings: Mapping[str, Any]) -> str:
 def format_backtest(
     rows: Sequence[BacktestRow], requirements: Mapping[str, Any], system: System
 ) -> list[Mapping[str, object]]:
-    """Return the lines of a recording's back-test, from rows of ``backtest``."""
+    """Return a line per row of ``backtest``: an error in the log and the predicted error."""
     lines: list[Mapping[str, object]] = []
     for row in rows:
         unit = choose_unit(DIMENSIONS[row.error], system)
@@ -396,13 +396,13 @@ def format_backtest(
 
 
 def format_range(lower: float | None, upper: float | None) -> str:
-    """Return the expected range of a ratio."""
+    """Return the expected range of a ratio near 1 as text, such as ``0.97 to 1.04``."""
     digits = numbers.count_digits(1.0, lower, upper)
     return f"{numbers.number_text(lower, digits)} to {numbers.number_text(upper, digits)}"
 
 
 def describe_backtest(row: RankingRow) -> str:
-    """Return the back-test of the deciding error, from a row of ``ranking``; empty without one."""
+    """Return the observed error relative to the predicted one, in words; empty if not tested."""
     if row.backtest_ratio is None:
         return ""
     channel = (row.backtest_channel or "all channels").replace("_", " ")

@@ -18,7 +18,7 @@ from imubench_pipeline.tables.keys import group_rows
 
 
 def make_models(site: Site) -> str:
-    """Return requirements and models as JSON; ``null`` if there are none."""
+    """Return requirements and noise models as JSON; ``null`` if the settings have no models."""
     settings = site.settings.get("models")
     if not settings:
         return "null"

@@ -12,7 +12,7 @@ from imubench_pipeline.noise import TERMS
 
 @dataclass(frozen=True)
 class Appearance:
-    """The appearance of a line."""
+    """The appearance of a line in a figure."""
 
     light: str  # colour on a light background
     dark: str  # colour on a dark background
@@ -84,7 +84,7 @@ TERM_NAMES = {
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
-    """Return the appearance of each sensor, by its position; after eight, colours repeat."""
+    """Return the appearance of each sensor by its place in the list; after 8, colours repeat."""
     looks = {}
     for place, sensor in enumerate(sensors):
         colour, turn = place % len(_COLOURS), place // len(_COLOURS)
@@ -94,7 +94,7 @@ def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
 
 
 def make_recording_styles(sensor_style: Appearance) -> list[Appearance]:
-    """Return the styles of the recordings of a sensor: its own, other shades, markers, dashes."""
+    """Return styles for the recordings of a sensor: ``sensor_style``, then variants of it."""
     own = sensor_style
     first, shades = _MARKERS.index(own.marker), len(_INK_SHARES)
     dashes = [own.dash, *(dash for dash in _DASHES if dash != own.dash)]

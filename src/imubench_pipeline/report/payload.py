@@ -53,10 +53,10 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 
 
 class Arrays:
-    """Arrays of a page: each is stored once, as base64 of its codes.
+    """The arrays of a page, each stored once, as base64 of float32 or of integer codes.
 
-    None and NaN are no value, code 0; the others divide the range evenly, or its logarithm. Codes
-    of a logarithm are stored as differences modulo 65536, all low bytes before all high ones.
+    Code 0 is a missing value (None, NaN); other codes divide the range, or its logarithm, evenly.
+    Codes of a logarithm are stored as differences modulo 65536, low bytes before high bytes.
     """
 
     def __init__(self) -> None:
@@ -89,7 +89,7 @@ class Arrays:
 
 
 def pack_styles(sensors: Mapping[str, Appearance]) -> Json:
-    """Return the appearance of sensors and methods."""
+    """Return the appearance of sensors and of all methods, for the scripts of a page."""
     return {
         "sensors": {name: asdict(look) for name, look in sensors.items()},
         "methods": {
@@ -101,14 +101,14 @@ def pack_styles(sensors: Mapping[str, Appearance]) -> Json:
 
 @dataclass(frozen=True)
 class ComparedChannel:
-    """The data of a channel in a comparison, small enough to hold all recordings in memory."""
+    """The data of a channel that pages compare, small enough to keep all recordings in memory."""
 
     about: Mapping[str, Any]  # names, recommended method, parameters by method
     curve: Mapping[str, Packed]
     models: Mapping[str, tuple[Packed, Packed]]  # tau and deviation, by method
 
     def among(self, arrays: Arrays) -> Json:
-        """Return the data with arrays replaced by their indices on the page."""
+        """Add the arrays to ``arrays``; return the data with indices in place of arrays."""
         return {
             **self.about,
             **{name: arrays.place(packed) for name, packed in self.curve.items()},
@@ -183,7 +183,7 @@ def pack_channel(view: ChannelView, arrays: Arrays) -> Json:
 
 
 def pack_page(channels: Sequence[ChannelView], looks: Mapping[str, Appearance]) -> Json:
-    """Return the data of a page with figures of channels, by the looks of all sensors."""
+    """Return the data of a page with figures of channels; ``looks`` are by sensor."""
     arrays = Arrays()
     return {
         "looks": pack_styles({channel.sensor: looks[channel.sensor] for channel in channels}),
@@ -206,7 +206,7 @@ def _name_terms(model: NoiseModel) -> list[tuple[str, Term]]:
 
 
 def pack_datasheet_lines(view: ChannelView) -> list[Json]:
-    """Return the datasheet's lines beside a curve: power ``slope`` of tau, and value at 1 s."""
+    """Return the datasheet's lines in the Allan plot: value at 1 s, and ``slope``, power of tau."""
     lines = []
     names = {"N": ("noise density", -0.5), "adev_minimum": ("bias instability", 0.0)}
     for row in view.datasheet:

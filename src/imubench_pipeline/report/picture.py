@@ -24,7 +24,7 @@ _LINE_POINTS = 24  # of a model and of limits: more would not be seen
 
 
 def draw_picture(views: Sequence[ChannelView], system: System) -> Markup:
-    """Return measured curves, 95 % limits, models and grades of the axes of a sensor as SVG."""
+    """Return an SVG of Allan deviations of axes: measured, 95 % limits, models, sensor grades."""
     unit = choose_page_unit(views[0].quantity, "adev", system)
     tau = np.concatenate([view.tau for view in views])
     adev = np.concatenate([view.adev for view in views]) * unit.per_si

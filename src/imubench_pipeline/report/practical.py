@@ -66,12 +66,12 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
-    """Return the initial unit of a parameter, ``adev``, ``psd`` (root of it) or ``signal``."""
+    """Return the initial unit on pages of a parameter, ``adev``, ``signal`` or root of ``psd``."""
     return _find_unit(quantity, symbol, choose_first_units(system)[quantity])
 
 
 def choose_figure_unit(quantity: str, figure: str, system: System) -> Unit:
-    """Return the unit of a datasheet figure on a page, by its key in the sensor file."""
+    """Return the unit of a datasheet figure on pages; ``figure`` is its key in the sensor file."""
     dimension = FIGURE_DIMENSIONS[quantity][figure][0]
     sign = SI_UNITS[dimension]
     if system == "practical":
@@ -91,7 +91,7 @@ def list_page_units() -> dict[str, dict[str, dict[str, Unit]]]:
 
 
 def choose_first_units(system: System) -> Mapping[str, str]:
-    """Return the initial choice of units of a page, by quantity."""
+    """Return the name of the initial choice of units on pages, by quantity."""
     place = 0 if system == "practical" else -1
     return {quantity: list(choices)[place] for quantity, choices in _UNIT_CHOICES.items()}
 
@@ -111,14 +111,14 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
 
 
 def choose_unit(dimension: str, system: System, size: float | None = None) -> Unit:
-    """Return the unit of an angle, velocity or length, with a prefix for ``size`` (SI)."""
+    """Return the unit of an angle, velocity or length; ``size`` (SI) chooses a prefix, as in km."""
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
     return next(unit for least, unit in list_units_by_size(dimension, system) if abs(size) >= least)
 
 
 def list_units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
-    """Return the units of an angle, a velocity or a length, each with its smallest value in SI."""
+    """Return the units of a dimension, the largest first, each with its smallest value in SI."""
     sign = _SIGNS_OF_DIMENSIONS[system][dimension]
     prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
     prefixes = _MIN_SIZE_OF_PREFIX if prefixed else ((0.0, ""),)

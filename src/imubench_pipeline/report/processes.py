@@ -16,10 +16,10 @@ _work: Callable[[int], Any]  # of this process
 
 
 def compute_in_order(make: Callable[[int], Made], number: int, processes: int) -> Iterator[Made]:
-    """Yield ``make(0)`` to ``make(number - 1)``.
+    """Yield ``make(0)`` to ``make(number - 1)``, from up to ``processes`` processes.
 
-    ``make`` must not change anything that others use: it may run in a copy of this process. Only
-    Linux copies a process safely beside the threads of numerical libraries.
+    ``make`` must not change shared objects: it may run in a copy of this process. There is one
+    process on other systems than Linux, where copies are unsafe beside threads of libraries.
     """
     processes = min(processes, number // _MIN_ITEMS_PER_PROCESS)
     if processes < 2 or sys.platform != "linux":

@@ -51,7 +51,7 @@ from imubench_pipeline.words.verdicts import doubts_text
 
 @cache  # compiling the templates takes longer than writing pages of a small report
 def make_templates(system: System) -> jinja2.Environment:
-    """Return the templates, with the initial units of the pages."""
+    """Return the Jinja environment of the pages; ``system`` sets their initial units."""
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(
             [Path(__file__).with_name("templates"), *files_of("templates")]
@@ -66,7 +66,7 @@ def make_templates(system: System) -> jinja2.Environment:
     def si(
         value: float | None, unit: str, digits: int | None = None, *, inside: bool = False
     ) -> Markup:
-        """Return an SI number whose unit the reader can switch; ``inside``: without the unit."""
+        """Return an SI number whose unit the reader can switch; ``inside``: the cell names it."""
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))
         rounded = f"{value:.7g}"
@@ -77,7 +77,7 @@ def make_templates(system: System) -> jinja2.Environment:
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
     def parameter_cell(cell: Mapping[str, Any], unit: str) -> Markup:
-        """Return a cell of `report.comparison` with its intervals, as compact HTML."""
+        """Return a parameter cell of `report.comparison` as compact HTML, with intervals."""
         digits = cell["digits"]
         number = partial(si, unit=unit, digits=digits, inside=True)
         parts = []
@@ -102,7 +102,7 @@ def make_templates(system: System) -> jinja2.Environment:
         return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or NO_VALUE}</td>')
 
     def sign(unit: str) -> Markup:
-        """Return the sign of a unit that the reader can switch."""
+        """Return the symbol of a unit that the reader can switch, as HTML."""
         return Markup('<span data-sign="{}">{}</span>').format(unit, _find_unit(unit, system).sign)
 
     templates.globals |= {
@@ -178,11 +178,11 @@ _SCRIPT_NAMES = (
 def publish(
     site: Site, folder: Path, say: Callable[[str], None] = lambda _: None, processes: int = 1
 ) -> list[str]:
-    """Write the pages of the report whose data changed, and remove obsolete ones.
+    """Write the pages of the report whose data changed; return their paths below ``folder``.
 
-    A page that fails is replaced by one with the reason, is named in `Site.failed`, and is made
-    again by the next call. ``say`` gets each path before it is written; the function returns the
-    written paths, below the folder.
+    Obsolete pages are removed. A page that fails is replaced by a page with the reason, is named in
+    `Site.failed`, and is made again by the next call. ``say`` is called with each path before the
+    page is written. ``processes`` is the number of processes that make pages.
     """
     written = []
     # A page opened from disk may not read files, but it may run scripts.
@@ -235,7 +235,7 @@ def publish(
 
 
 def remove_old_pages(folder: Path, made: Path) -> None:
-    """Remove pages of an earlier report that are not in the new one, and no other file."""
+    """Remove, from ``folder``, pages of an earlier report that the report in ``made`` lacks."""
     gone = _read_keys(folder / KEYS).keys() - _read_keys(made / KEYS).keys()
     for path in folder.rglob("*.html"):
         if path.relative_to(folder).as_posix() in gone and not path.is_symlink():
@@ -360,22 +360,25 @@ def render_one_file(site: Site) -> str:
 
 
 def make_site(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
-    """Return the site of a run, from the settings of its plan."""
+    """Return the data of the report of a run; ``settings`` is JSON of `Plan.report_settings`."""
     return Site(tables, json.loads(settings), results, ENTRIES, digest_sources("report.publish"))
 
 
 def load_site(results: Path) -> Site:
-    """Return the site of a finished run; FileNotFoundError without one, else ValueError."""
+    """Return the data of the report of a finished run.
+
+    Raises FileNotFoundError if there are no results, ValueError if they cannot be read.
+    """
     path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")
     try:
         missing = _REQUIRED_SETTINGS - json.loads(settings).keys()
     except (ValueError, AttributeError) as error:
-        raise ValueError(f"{path}: is damaged; remove it, and run snakemake -c2 again") from error
+        raise ValueError(f"{path}: is no JSON object; remove it, and run snakemake -c2") from error
     if missing:
         raise ValueError(
             f"{path}: was made by another version of imubench_pipeline: it has no "
-            f"{', '.join(sorted(missing))}; run snakemake -c2 again, as for these results"
+            f"{', '.join(sorted(missing))}; run snakemake -c2 again, with the same options"
         )
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
     paths = {name: locate_table(results, name) for name in names}

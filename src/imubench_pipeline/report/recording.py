@@ -54,7 +54,7 @@ _MIN_SHOWN_RATIO = 1.05
 
 
 def list_thermal_figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
-    """Yield the lines of the table: temperature effect, if it was fitted, and low-pass."""
+    """Yield lines of a table: the temperature effect, if it was fitted, and the low-pass."""
     estimated = channel.parameters.get("likelihood", ())
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
     low_pass: Mapping[str, _Figure] = {**channel.low_pass, **before}
@@ -135,13 +135,13 @@ _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
 Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
-"""Returns the template of a section of a static recording, and its variable `section`."""
+"""Returns the template of a section of a page, and its variable `section`; None: no section."""
 
 _SECTIONS: Hook[Section] = Hook("recording_sections")
 
 
 def make_recording_page(site: Site, view: RecordingView, of: RecordingPage) -> Page:
-    """Return the page of a recording of any kind."""
+    """Return the page of a recording; ``of`` is the page of its kind."""
     folder = site.results / "recordings" / view.sensor / view.name
     # The digest of the data of a recording's page; `folder` is the recording's
     shown = ("envelope", "histogram", "samples_of_models")
@@ -154,13 +154,13 @@ def make_recording_page(site: Site, view: RecordingView, of: RecordingPage) -> P
 
 
 def read_sample_rows(folder: Path, of: type[R]) -> list[R]:
-    """Return the rows of a table of samples in the folder of a recording, if any."""
+    """Return the rows of the table of class ``of`` in the folder of a recording, if any."""
     path = folder / f"{of.table}.parquet"
     return of.rows_of(read(of.table, [path])) if path.is_file() else []
 
 
 def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
+    """Return the variables of the template of a static recording; ``folder`` has its results."""
     arrays = payload.Arrays()
     envelope = read_sample_rows(folder, estimates.EnvelopeRow)
     histogram = read_sample_rows(folder, estimates.HistogramRow)
@@ -396,7 +396,7 @@ def _describe_model(channel: ChannelView) -> str:
 def describe_recording(
     site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Mapping[str, object]:
-    """Return the common context of the pages of recordings; ``folder`` is the recording's."""
+    """Return variables that the pages of all recordings share; ``folder`` has its results."""
     metadata, row = load_metadata(folder), view.row
     provenance = [
         ("Recording", f"{row.sensor} / {row.recording}"),
@@ -433,7 +433,7 @@ def describe_recording(
 
 
 def load_metadata(folder: Path) -> recording.LogMetadata | None:
-    """Return the metadata of a log; None without samples, RecordingError if it was altered."""
+    """Return the metadata of a log, None without samples; raises RecordingError if altered."""
     stored = folder / recording.METADATA_FILE
     if stored.is_file():  # of an object store: the samples are not needed for it
         return recording.read_metadata(stored) if stored.read_bytes() != b"null" else None

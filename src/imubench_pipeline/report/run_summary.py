@@ -69,7 +69,7 @@ def summarise_run(results: Path) -> str:
 
 
 def list_failed_pages(results: Path) -> str:
-    """Return the failed pages of the report, with the reasons; empty if there are none."""
+    """Return a text with the failed pages of the report and the reasons; empty without any."""
     failed = read_failed_pages(results / "report")
     lines = (f"\n  {fold_text(f'{path}: {reason}')}" for path, reason in failed.items())
     return "pages that could not be made; the next run tries again" * bool(failed) + "".join(lines)
@@ -141,7 +141,7 @@ def list_warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
 
 
 def select_warnings(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
-    """Yield warnings and errors, except the finding that a recording is omitted."""
+    """Yield the warnings and errors, except the finding that a recording is left out."""
     for row in findings:
         if row.severity != "note" and row.finding not in LEFT_OUT:
             yield row
@@ -167,7 +167,7 @@ def list_best_sensors(
 
 
 def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:
-    """Return a text from logs on one line, without control characters, cut with an ellipsis."""
+    """Return a text on one line, without control characters, of up to ``longest`` characters."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     shown = " ".join(shown.split())
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"

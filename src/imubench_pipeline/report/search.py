@@ -18,7 +18,7 @@ _ADDED: Hook[Search] = Hook("search")
 
 
 def make_search_index(site: Site) -> str:
-    """Return the index as JSON."""
+    """Return the index of the search as JSON: a list of `Found`."""
     return json.dumps(list(_list_entries(site)), ensure_ascii=False, separators=(",", ":"))
 
 

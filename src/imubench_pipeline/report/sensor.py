@@ -188,7 +188,7 @@ def _list_events(own: Sequence[RecordingView], system: System) -> Iterator[str]:
 
 
 def make_device_page(site: Site, page: str) -> Page:
-    """Return the page of a device: its recordings over time."""
+    """Return the page of a device, its recordings by date; ``page`` is the path of the page."""
     own = [view for view in site.views if view.device_page == page]
     named = {view.full_name for view in own}
     rows = [row for row in site.rows(comparisons.DriftRow) if (row.sensor, row.recording) in named]
@@ -266,7 +266,7 @@ def _list_trends(
 
 
 def describe_change(row: comparisons.DriftRow, *, simulated: bool) -> str:
-    """Return a change of a device in words."""
+    """Return the change of a parameter of a device in words, with its p-value."""
     name = symbol_text(row.parameter)
     by = "" if row.change is None else f" by {100 * row.change:+.0f} %".replace("-", "−")
     chance = f"{row.p_value:.1g}" if row.p_value is not None else "–"
@@ -287,7 +287,7 @@ def _describe_margins(row: comparisons.RankingRow) -> str:
 def trace_verdicts(
     site: Site, sensor: str, own: Sequence[RecordingView]
 ) -> Iterator[Mapping[str, object]]:
-    """Yield each requirement with the verdict on a sensor, its numbers and its recordings."""
+    """Yield, per requirement, the verdict on a sensor, and the numbers and recordings behind it."""
     rows = site.rows(comparisons.RankingRow)
     own_rows = [row for row in rows if row.sensor == sensor]
     totals = [

@@ -66,7 +66,7 @@ SHORTLIST = Entry(
 
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:
-    """Return rank, sensor, verdict, margins (in use, noise, likely) and limit, as texts."""
+    """Return rank, sensor, verdict, margins (in use, noise, likely), and limit or reason."""
     margins = (row.margin, row.noise_margin, row.likely_margin)
     return [
         str(row.rank or "–"),

@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def show(parts: "Callable[[int], Iterable[RenderableType]]", width: int | None = None) -> None:
-    """Print the result of a function of the width, by default the width of the terminal."""
+    """Print what ``parts`` returns for a width in columns, by default of the terminal."""
     from rich.console import Console
     from rich.text import Text
 

@@ -28,7 +28,7 @@ from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 
 def make_command(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
-    """Return a command such as ``figures`` for the results of a run, with values of its options."""
+    """Return the command line of `imubench`, such as ``imubench figures results --sensor a``."""
     words = ["imubench", name, f"./{results}" if results.startswith("-") else results]
     for key, value in (options or {}).items():
         words += [f"{key}={value}"] if value.startswith("-") else [key, value]
@@ -36,7 +36,7 @@ def make_command(name: str, results: str, options: Mapping[str, str] | None = No
 
 
 def make_recompute_command(target: str, overrides: Sequence[str] = ()) -> str:
-    """Return the command that recomputes a file of a recording, with the settings ``overrides``."""
+    """Return the command that recomputes a file; ``overrides`` are settings, KEY=VALUE."""
     stated = ["--config", *overrides] if overrides else []
     # After the two dashes, nothing is read as an option.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
@@ -47,18 +47,18 @@ _PACKAGE = "imubench_pipeline"
 _FIRST_ROWS = 100  # rows of a long table that are shown at first
 _PLAIN_ROWS = 30  # rows of a long table that are plain HTML, for readers without JavaScript
 _MAX_COMPARED = 60  # recordings on a page that compares, so that it opens fast
-_MIN_OF_SENSOR = 3  # but of each sensor at least so many
+_MIN_OF_SENSOR = 3  # recordings of each sensor that are compared, even if these are more
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 
 @dataclass(frozen=True)
 class Page:
-    """One page."""
+    """A page of the report, which is made by filling the template."""
 
     path: str  # below the folder of the report
     template: str
     key: str  # digest of its content: the page is written again only if it changes
-    context: Callable[[], Mapping[str, object]]  # of the template
+    context: Callable[[], Mapping[str, object]]  # returns the variables of the template
 
     @property
     def root(self) -> str:
@@ -70,14 +70,14 @@ class Page:
 class Entry:
     """A page that occurs once in a report, declared in the module of its content."""
 
-    file: str  # its name; its template is called so, too, with ``.jinja``
+    file: str  # name of the page; the name of its template ends with ``.jinja`` in addition
     title: str
-    context: "Callable[[Site], Mapping[str, object]]"  # of the template
+    context: "Callable[[Site], Mapping[str, object]]"  # returns the variables of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
-    # returns the recordings that it shows: the same if any of their rows change
+    # returns the recordings that it shows: it is also written again if their rows change
     views: "Callable[[Site], Sequence[RecordingView]]" = lambda _: ()
-    # returns the files of recordings that it shows: the same
+    # returns the files of recordings that it shows: it is also written again if they change
     files: "Callable[[Site], Iterable[Path]]" = lambda _: ()
     exists: "Callable[[Site], bool]" = lambda _: True  # returns whether a report has it
     about: str = ""  # what it shows, for the page of experiments; empty: it is in the menu
@@ -85,16 +85,16 @@ class Entry:
 
     @property
     def sections(self) -> "list[Section]":
-        """The sections that extensions add."""
+        """The sections that extensions add to this page."""
         return [section for section in _SECTIONS.objects() if section.page == self.file]
 
     @property
     def shown_tables(self) -> set[str]:
-        """The joined tables that it shows, including its sections."""
+        """Names of the joined tables that this page and its sections show."""
         return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
 
     def page(self, site: "Site") -> Page:
-        """Return the page of a report."""
+        """Return this page for a report."""
         shown = (site.tables[table].to_pylist() for table in sorted(self.shown_tables))
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
         key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
@@ -121,7 +121,7 @@ _SECTIONS: Hook[Section] = Hook("sections")
 
 @dataclass
 class Site:
-    """The data of all pages."""
+    """The data of a report, for all of its pages."""
 
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # from `imubench_pipeline.run.plan.Plan.report_settings`
@@ -134,7 +134,7 @@ class Site:
 
     @property
     def title(self) -> str:
-        """Title of the report; of a single log, its name."""
+        """Title of the report; if it is about a single log, the name of that log."""
         if self.is_single:
             (view,) = self.views
             name = self.names[view.sensor]
@@ -143,7 +143,7 @@ class Site:
 
     @property
     def is_single(self) -> bool:
-        """Whether the report is of one log: then its page is the only one of data."""
+        """Whether the report is about one log, made without a run: then only one page has data."""
         return self.at_once is not None and len(self.views) == 1
 
     @property
@@ -159,11 +159,11 @@ class Site:
 
     @property
     def at_once(self) -> str | None:
-        """The command that made the report without keeping results; None for a run."""
+        """The command that made the report without a folder of results; None if a run made it."""
         return self.settings.get("at_once")
 
     def on_purpose(self, view: RecordingView) -> Mapping[str, str]:
-        """Return the purpose of a simulated recording, by finding."""
+        """Return, by finding, why a simulated recording has it; empty if none is intended."""
         shown: Mapping[str, Mapping[str, str]] = self.settings.get("on_purpose", {})
         return shown.get(f"{view.sensor}/{view.name}", {})
 
@@ -191,16 +191,16 @@ class Site:
         return views
 
     def compared(self, views: Iterable[RecordingView]) -> Iterator[ComparedRecording]:
-        """Yield the compared data of recordings."""
+        """Yield the data of recordings that pages compare, gathered once for all pages."""
         for view in views:
             if view.full_name not in self._compared:
                 self._compared[view.full_name] = gather_recording(view, self.system)
             yield self._compared[view.full_name]
 
     def select_compared(self, views: Sequence[RecordingView]) -> list[RecordingView]:
-        """Return the recordings that a page compares: all, or the latest ones of each sensor.
+        """Return the recordings that a page compares: all, or if too many, some of each sensor.
 
-        Among them are the recordings that decide, and the longest one that may decide.
+        Recordings that decide a ranking, and the longest usable one, come first; then the latest.
         """
         most = max(_MIN_OF_SENSOR, _MAX_COMPARED // max(1, len({view.sensor for view in views})))
         deciding = {(row.sensor, row.recording) for row in self.rows(RankingRow) if row.decides}
@@ -213,12 +213,12 @@ class Site:
         return [view for view in views if view.full_name in chosen]
 
     def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
-        """Return sensor and name of the recordings that have rows of a class."""
+        """Return sensor and name of recordings with rows in the joined table of class ``of``."""
         return {(row.sensor, row.recording) for row in self.rows(of)}
 
     @cached_property
     def existing(self) -> list[Entry]:
-        """The pages that this report has once."""
+        """The entries that this report has, in the order of the menu."""
         return [entry for entry in self.entries if entry.exists(self)]
 
     @cached_property
@@ -253,23 +253,23 @@ class Site:
         return [name for name in _CHANNEL_ORDER if name in present]
 
     def sensor_page(self, sensor: str) -> str:
-        """Return the page of a sensor."""
+        """Return the path of the page of a sensor."""
         return f"sensors/{sensor}.html"
 
     def rows(self, of: type[R]) -> list[R]:
-        """Return the rows of a joined table, by their class."""
+        """Return the rows of the joined table of class ``of``."""
         if of.table not in self._rows:
             self._rows[of.table] = of.rows_of(self.tables[of.table])
         return self._rows[of.table]
 
     @cached_property
     def coverage(self) -> dict[tuple[str, str, str], str]:
-        """Whether sensor, quantity and figure are published."""
+        """Whether a figure is published (table ``coverage``), by sensor, quantity and figure."""
         rows = self.rows(CoverageRow)
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
     def changed_devices(self) -> list[Mapping[str, object]]:
-        """Return the recordings with a change of their device, and the changed parameters."""
+        """Return the recordings in which a device has changed, with the changed parameters."""
         devices: dict[Name, tuple[DriftRow, list[str]]] = {}
         for row in self.rows(DriftRow):
             if row.verdict != "changed":
@@ -295,7 +295,7 @@ class Site:
         return _make_digest(settings, self.names, files, self.code, version(_PACKAGE))
 
     def key_of(self, *parts: object) -> str:
-        """Return the digest of the content of a page."""
+        """Return the digest of the content of a page: ``parts``, and what all pages have."""
         return _make_digest(self.common, *parts)
 
     def shown(self, *, alone: bool = False) -> Mapping[str, object]:
@@ -320,12 +320,12 @@ class Site:
 
 @dataclass(frozen=True)
 class RecordingPage:
-    """The page of a recording of a kind."""
+    """The template and its variables for recordings of one kind, such as static ones."""
 
     template: str
-    # returns the context of the template, by the folder of the recording, too
+    # returns the variables of the template; the path is the folder of the recording
     context: Callable[[Site, RecordingView, Path], Mapping[str, object]]
-    words: str = ""  # of the kind, in lists of recordings
+    words: str = ""  # name of the kind in lists of recordings
 
 
 RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
@@ -347,7 +347,7 @@ def name_sensors(
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file if two are equal.
 
-    A sensor that is not described has the name of its file.
+    A sensor that is not in ``described`` has the name of its file.
     """
     names = {sensor: sensor for sensor in sensors}
     names |= {of: f"{x['vendor']} {x['model']}" for of, x in described.items() if of in names}

@@ -36,8 +36,8 @@ _MAX_BAR_DECADES = 2.0  # maximum decades from 1 that a bar shows
 class Scale:
     """The logarithmic scale on which all margins of a matrix are drawn."""
 
-    low: float  # decades, of the left end
-    high: float
+    low: float  # logarithm to base 10 of the margin at the left end
+    high: float  # and at the right end
 
     @classmethod
     def of(cls, margins: Iterable[float]) -> "Scale":
@@ -54,14 +54,14 @@ class Scale:
 
     @property
     def ticks(self) -> list[tuple[str, float]]:
-        """Decades with their places."""
+        """The powers of ten on the scale, as text, with their positions, % of the width."""
         powers = range(math.ceil(self.low), math.floor(self.high) + 1)
         return [(numbers.number_text(10.0**power), self.place(10.0**power)) for power in powers]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A sensor and a requirement."""
+    """The verdict on a sensor for a requirement, with its margin and its reasons."""
 
     requirement: str
     sensor: str
@@ -69,10 +69,10 @@ class Cell:
     conditions: int = 0  # unknown figures on which the verdict depends
     # the margin with its 95 % limits
     margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None = None
-    other_margins: str = ""  # of noise alone, and the likely one
-    bar: tuple[float, float, float] | None = None  # of the margin and its limits, the places
-    noise: float | None = None  # of the margin of noise alone, the place
-    likely: tuple[SourcedNumber, float] | None = None  # margin of a conditional verdict, and place
+    other_margins: str = ""  # margin of the noise without other errors, and likely margin
+    bar: tuple[float, float, float] | None = None  # positions of the margin and its limits, %
+    noise: float | None = None  # position of the margin of the noise without other errors, %
+    likely: tuple[SourcedNumber, float] | None = None  # margin of a conditional verdict, position
     weak: str = ""  # reasons for weak evidence
     doubts: str = ""  # doubts about the recordings
     reason: str = ""  # why it is not judged
@@ -86,12 +86,12 @@ class Cell:
 
     @property
     def hatched(self) -> bool:
-        """Whether the evidence is weak, or the recordings are in doubt."""
+        """Whether the cell is hatched: the evidence is weak, or the recordings are in doubt."""
         return bool(self.weak or self.doubts)
 
 
 def make_decision_matrix(site: Site) -> Mapping[str, object] | None:
-    """Return the matrix of a report; None if there are no requirements."""
+    """Return the decision matrix, sensors by requirements; None if no sensor was ranked."""
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
@@ -213,7 +213,7 @@ def _place_margin(
 
 
 def summarise_counts(site: Site) -> list[dict[str, object]]:
-    """Return the counts of the report, each with its noun and link."""
+    """Return counts for the start page, such as ``3 sensors``, each with its link."""
     views = site.views
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
@@ -299,7 +299,7 @@ def _start(site: Site) -> Mapping[str, object]:
 
 
 def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -> str:
-    """Return a sentence with number, length, dates and states of recordings."""
+    """Return number, length, dates and states of recordings, of ``several`` sensors or one."""
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected

@@ -31,7 +31,7 @@ from imubench_pipeline.words.verdicts import used_doubts_text
 
 R = TypeVar("R", bound=OfRecordingRow)
 
-About = Mapping[tuple[str, str], RecordingRow]
+About = Mapping[tuple[str, str], RecordingRow]  # by sensor and recording
 
 _NAME_FOLDS_AT, _GAP = 16, 2  # of tables, columns of the terminal
 TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
@@ -60,9 +60,9 @@ def render_comparison(
 ) -> Iterator[RenderableType]:
     """Yield the parts of the comparison, from top to bottom.
 
-    The ranking is for one requirement with every limit, or for all requirements with the deciding
-    limit. Parameters are of one channel or all, by one method or the recommended one. The width is
-    in columns of the terminal.
+    The ranking has all limits of a requirement; if it is None, the deciding limit of all
+    requirements. Without ``channel``, parameters are of all channels; without ``method``, they are
+    by the recommended method of each channel. The width is in columns of the terminal.
     """
     recordings = RecordingRow.rows_of(tables["recordings"])
     about = {(row.sensor, row.recording): row for row in recordings}
@@ -324,11 +324,11 @@ def fit_table(
     *,
     names: int,
 ) -> Table:
-    """Return a table that breaks no word or number, except for names.
+    """Return a table for a terminal of ``width`` columns, which breaks no word or number.
 
-    Columns that do not fit into the width are omitted from the right. The head of a
-    column of numbers has their unit on a second line; ``names`` is the column that may be broken
-    anywhere.
+    ``names`` is the index of the table's column of names, which may be broken anywhere. If there is
+    no room, columns are omitted from the right. A head with two lines is of numbers, which are
+    aligned to the right; the second line is the unit.
     """
     cells = [["-", *map(str, column)] for column in zip(heads, *lines, strict=True)]
     widths = [max(cell_len(word) for cell in column for word in cell.split()) for column in cells]

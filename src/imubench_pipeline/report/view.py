@@ -85,7 +85,7 @@ class ChannelView:
 
     @property
     def warnings(self) -> list[str]:
-        """Terms of the warnings of the channel, each once."""
+        """Keys in the glossary of the warnings about the channel, each once."""
         serious = [row.finding for row in self.findings if row.severity != "note"]
         if any(row.chosen and row.verdict == "not explained" for row in self.models):
             serious.append("verdict_not_explained")
@@ -112,9 +112,9 @@ class ChannelView:
         return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
 
     def bin_limits(self) -> tuple[Array, Array]:
-        """Return the 95 % limits of the density of the bins, given the fit of the spectrum.
+        """Return the 95 % limits of the density of the bins, if the fit of the spectrum is correct.
 
-        A bin scatters as chi squared of its degrees of freedom over their number.
+        A bin divided by the fit is a chi-squared variate divided by its degrees of freedom.
         """
         fitted, freedom = self.spectrum["fitted"], self.spectrum["ordinates"]
         lower, upper = (fitted * chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
@@ -127,7 +127,7 @@ class ChannelView:
         return self._models[method]
 
     def named(self, method: str, symbol: str) -> list[estimates.ParameterRow]:
-        """Return the rows of a parameter of a method, one per component."""
+        """Return the estimates of the parameter ``symbol`` by a method, one row per component."""
         return [row for row in self.parameters[method] if row.parameter == symbol]
 
 
@@ -143,7 +143,7 @@ class RecordingView:
     parts: Mapping[str, pa.Table]  # its rows of each table
     # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
-    page: str = ""  # its page
+    page: str = ""  # path of its page
     # the page of its device, if the device has a name of its own or several recordings
     device_page: str | None = None
 
@@ -164,7 +164,7 @@ class RecordingView:
 
     @property
     def simulated(self) -> bool:
-        """Made from known parameters, not measured."""
+        """Whether the recording is simulated from known parameters, not measured."""
         return self.row.simulated
 
     @property
@@ -189,45 +189,45 @@ class RecordingView:
 
     @cached_property
     def findings(self) -> list[FindingRow]:
-        """Findings of the recording, except that it is omitted."""
+        """Findings of the recording, except the finding that it is left out."""
         return [row for row in self.rows(FindingRow) if row.finding not in LEFT_OUT]
 
     @property
     def warnings(self) -> list[FindingRow]:
-        """Its warnings."""
+        """Its warnings; notes and errors are omitted."""
         return [row for row in self.findings if row.severity == "warning"]
 
     @property
     def budget(self) -> list[ErrorBudgetRow]:
-        """Errors of the recording after the times of the settings."""
+        """Its error budget for the times in the settings, without the times of requirements."""
         part = self.parts[ErrorBudgetRow.table]
         return ErrorBudgetRow.rows_of(part.filter(pc.is_null(part["requirement"])))
 
     def rows(self, of: type[R]) -> list[R]:
-        """Return its rows of a table, by their class."""
+        """Return the rows of the recording in the table of class ``of``."""
         part = self.parts[of.table]
         return of.rows_of(part) if part.num_rows else []
 
     def recommended(self) -> dict[str, str]:
-        """Return the method to use for each channel."""
+        """Return the recommended method of each channel."""
         part = self.parts["parameters"]
         chosen = part.filter(part["recommended"])
         return dict(zip(chosen["channel"].to_pylist(), chosen["method"].to_pylist(), strict=True))
 
     @property
     def rates(self) -> list[float]:
-        """The rate of each row of the table ``allan``, Hz."""
+        """The sampling rate of the channel of each row of the table ``allan``, Hz."""
         allan = self.parts["allan"]
         return (allan["cluster_size"].to_numpy() / allan["tau"].to_numpy()).tolist()
 
     @property
     def channel_names(self) -> list[str]:
-        """Names of its channels, which are not made for it."""
+        """Names of its channels, which are read from the table ``allan``."""
         names: list[str] = self.parts["allan"]["channel"].unique().to_pylist()
         return names
 
     def channels(self) -> list[ChannelView]:
-        """Return its channels, made anew."""
+        """Return the data of its channels, made from the tables in each call."""
         channels = {}
         for (name,), part in split_table(self.parts["allan"], "channel").items():
             named = (self.sensor, self.name, name, self.simulated)
@@ -269,7 +269,7 @@ class RecordingView:
 
 
 def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
-    """Gather the tables by recording, in the order of the table ``recordings``."""
+    """Return the data of each recording, in the order of the table ``recordings``."""
     divided = {name: split_table(tables[name], "sensor", "recording") for name in BY_RECORDING}
     keys = cache(partial(_make_keys, tables))
     views = []

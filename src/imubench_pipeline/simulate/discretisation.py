@@ -115,10 +115,12 @@ class HeldInput:
     """Response of the filter deviation e to an input that is linear between samples."""
 
     step: Array  # shape (m,); e changes by ``step`` times the change of the input
-    lag_decay: float  # the lag ε = lagged - input of a first-order lag becomes
-    lag_step: float  # ``lag_decay * ε + lag_step * change``
-    lag_coupling: Array  # shape (m,); for a lagged input e changes by
-    lagged_step: Array  # ``lag_coupling * ε + lagged_step * change``
+    # ε, the lagged minus the actual input, becomes ``lag_decay * ε + lag_step * change``
+    lag_decay: float
+    lag_step: float
+    # shape (m,); for a lagged input, e changes by ``lag_coupling * ε + lagged_step * change``
+    lag_coupling: Array
+    lagged_step: Array
 
 
 def discretise_held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:

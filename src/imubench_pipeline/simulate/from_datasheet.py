@@ -46,15 +46,13 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
     if not axes:
         raise ConfigError(
             f"{name}: the datasheet prints no noise density, random walk or rms noise of any "
-            "channel; expected one, or --results, or a file of models"
+            "channel; add one to the sensor file, or use --results or a file of models"
         )
     origin.imu = ImuModel(axes=axes)
     return origin
 
 
 class _Printed:
-    """The printed figures of one axis."""
-
     def __init__(self, sensor: Sensor, channel: str, origin: Origin) -> None:
         self._sensor, self._channel = sensor, channel
         self._quantity, self._axis = quantity_of(channel), channel[-1]

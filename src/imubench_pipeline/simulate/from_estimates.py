@@ -26,11 +26,11 @@ _NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_
 def with_estimates(
     printed: Origin, results: Path, name: str, recording: str | None = None
 ) -> Origin:
-    """Replace printed figures by the estimates of a run; there may be no printed figures.
+    """Return the model ``printed``, with its figures replaced by the estimates of a run.
 
     The estimates are from the longest recording, or from the named one: noise (recommended method)
     and bias. If a temperature effect was compensated, the compensated noise, the bias and the drift
-    are used. The cut-off is used if it has a value. Resolution and full scale stay as printed.
+    are used. The cut-off is used if it has a value. Resolution and full scale remain as printed.
     Raises ConfigError if there is no estimate of the sensor, or of the recording.
     """
     folder = find_tables_folder(results)
@@ -51,7 +51,7 @@ def with_estimates(
         of_channel = {table: rows.filter(own) for table, rows in of_log.items()}
         if len(of_channel["parameters"]):
             if recorded.rate is None:
-                raise ConfigError(f"{name}/{chosen}: its rate is not known")
+                raise ConfigError(f"{name}/{chosen}: no rate is known; use another --recording")
             of_datasheet = printed.imu.axes.get(channel) or SensorModel()
             log, rate = f"{name}/{chosen}", recorded.rate
             axes[channel], remarks = _estimate_axis(of_datasheet, channel, of_channel, log, rate)
@@ -59,7 +59,7 @@ def with_estimates(
             others = printed.figures.get(channel, [])
             figures[channel] = remarks + [each for each in others if each.topic not in topics[-1]]
     if not axes:
-        raise ConfigError(f"{folder}: no estimate of {name}/{chosen}")
+        raise ConfigError(f"{folder}: no estimate of {name}/{chosen}; choose another --recording")
     estimated = set[Topic].intersection(*topics)
     origin = Origin(
         ImuModel(axes=axes),
@@ -78,7 +78,6 @@ def with_estimates(
 def _select_recording(
     recordings: pa.Table, folder: Path, name: str, asked: str | None
 ) -> RecordingRow:
-    """Return the row of the requested recording, or of the longest one."""
     of_sensor = RecordingRow.rows_of(recordings.filter(pc.field("sensor") == name))
     usable = {row.recording: row for row in of_sensor if row.status == "ok"}
     if not usable:

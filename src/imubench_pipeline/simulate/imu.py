@@ -19,7 +19,7 @@ SAMPLES_PER_BLOCK = 8 * SAMPLES_PER_CHUNK
 
 @dataclass(frozen=True, kw_only=True)
 class ImuModel:
-    """The axes of one sensor; ValueError for an unknown channel, or no finite 3 by 3 matrix."""
+    """The model of a sensor; raises ValueError for an unknown channel or an invalid figure."""
 
     axes: Mapping[str, SensorModel]  # by channel, ``gyro_x`` to ``accel_z``
     misalignment: Mapping[str, Array] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class ImuModel:
             if np.shape(matrix) != (3, 3) or not np.isfinite(matrix).all():
                 raise ValueError(f"misalignment of {quantity}: expected 3 by 3 finite numbers")
         if not self.temperature_step >= 0:
-            raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
+            raise ValueError(f"temperature_step is {self.temperature_step}, expected 0 or more")
 
     def sensed(self, channel: str) -> dict[str, float]:
         """Return the sensitivity of an axis, such as ``gyro_x``, to each channel that it senses."""

@@ -30,10 +30,9 @@ from imubench_pipeline.typing import Array
 
 _FREQUENCIES_PER_CHUNK = 2048  # frequencies per block of the computation
 _MIN_TIME_RATIO = 1e-5
-"""Shortest correlation time of flicker noise, over the time constant of the filter or the sampling
-interval, whichever is shorter."""
-
-_MAX_TIME_RATIO = 1e5  # longest correlation time of flicker noise, over the longest requested time
+"""Ratio of the shortest correlation time of flicker noise to the time constant of the filter or the
+sampling interval, whichever is shorter."""
+_MAX_TIME_RATIO = 1e5  # ratio of the longest correlation time of flicker noise to `longest`
 
 
 def _realise(
@@ -53,9 +52,10 @@ def _realise(
 
 
 def compute_sampled_spectrum(drives: Drives, low_pass: LowPass, omega: Array, rate: float) -> Array:
-    """Return the spectrum of samples at a rate, Hz, SI^2, in the shape of omega, rad/sample.
+    """Return the spectrum, SI^2, of filtered noise that is sampled at ``rate``, Hz.
 
-    It follows from the exact discrete state space of each process and the filter.
+    It has the shape of ``omega``, rad/sample, and follows from the exact discrete state space of
+    each process and the filter.
     """
     interval = 1.0 / rate
     flat = np.ravel(omega)
@@ -107,12 +107,12 @@ class TemperatureDrift:
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} is {getattr(self, name)}, expected a finite number")
         if self.lag < 0:
-            raise ValueError(f"lag is {self.lag} s, expected a time from 0")
+            raise ValueError(f"lag is {self.lag} s, expected 0 s or more")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorModel:
-    """One axis of a sensor.
+    """The model of one axis of a sensor.
 
     Raises ValueError if a figure is out of its range, or a further term has no `Term.drive`.
     """
@@ -130,7 +130,7 @@ class SensorModel:
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} is {getattr(self, name)}, expected a finite number")
         if not (math.isfinite(self.resolution) and self.resolution >= 0):
-            raise ValueError(f"resolution is {self.resolution}, expected a step from 0")
+            raise ValueError(f"resolution is {self.resolution}, expected 0 or more")
         if self.full_scale is not None and not self.full_scale > self.resolution:
             raise ValueError(
                 f"full_scale is {self.full_scale}, expected more than the resolution, "
@@ -138,7 +138,7 @@ class SensorModel:
             )
         for term in self.noise.further:
             if term.drive is None:
-                raise ValueError(f"{term} drives no filter (`Term.drive`): no sensor can have it")
+                raise ValueError(f"{term} has no input to a filter (`Term.drive`); remove it")
 
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
         """Return the spectrum of the samples, with aliasing, SI^2, in the shape of omega.
@@ -173,14 +173,14 @@ def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> Noi
 
 
 def folding(model: SensorModel, rate: float) -> float:
-    """Return the density of the samples at low frequencies over N^2 (aliasing factor)."""
+    """Return the density of the samples at low frequencies divided by N^2 (aliasing factor)."""
     unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
     return float(unit.sampled_spectrum(np.array([_LOW_FREQUENCY]), rate)[0]) / rate
 
 
 MAX_FREQUENCY_RATIO = 30.0
-"""Highest frequency of the approximation, over the cut-off frequency. There a filter of first order
-attenuates the power by 99.9 %."""
+"""Ratio of the highest frequency of the approximation to the cut-off frequency. There, a filter of
+first order attenuates the power by 99.9 %."""
 
 _MEMBERS_PER_DECADE = 2.0
 _POINTS_PER_DECADE = 20
@@ -198,7 +198,8 @@ def fit_density_bank(B: float, lowest: float, highest: float) -> list[GaussMarko
     this density. The relative ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two per decade.
 
     The variances are fitted by non-negative least squares of the relative error. B is the bias
-    instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
+    instability, rad/s or m/s^2, whose plateau is 0.664 B; the band, ``lowest`` to ``highest``, is
+    in Hz.
     """
     times, variances = _fit_unit_bank(round(math.log10(highest / lowest), 6))
     processes = []

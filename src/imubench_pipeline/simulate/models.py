@@ -53,7 +53,7 @@ class Origin:
 
 
 def read_model_file(path: Path) -> Origin:
-    """Read a file of models (see `settings`); ConfigError without it, or for an invalid figure."""
+    """Return the model in a file; raises ConfigError without the file, or for an invalid figure."""
     settings = read_settings(ModelSettings, path)
     source = f"the model file {path.name}" + (f" ({settings.source})" if settings.source else "")
     as_given = Remark("noise", f"as stated in {path.name}")
@@ -80,18 +80,18 @@ _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 
 @dataclass(frozen=True)
 class Simulation:
-    """Simulation of a recording of several sensors or of an experiment."""
+    """How an extension simulates recordings of several sensors or of an experiment."""
 
     # yields the blocks of its channels, with its motion and its temperature
     blocks: Callable[
         [SimulatedRecording, Mapping[str, Profile], Profile | None], Iterator[dict[str, Array]]
     ]
-    # returns the factors on N, B and K of a channel, against those of one sensor
+    # returns factors of N, B and K of a channel, relative to a single sensor
     factors: Callable[[SimulatedRecording, str], Mapping[str, float]]
 
 
 SIMULATIONS: Hook[Simulation] = Hook("simulations")
-"""How they are simulated, by their block of settings."""
+"""Simulations by extensions, by their block of settings."""
 
 
 def make_axis_model(settings: AxisSettings, channel: str) -> SensorModel:

@@ -56,13 +56,13 @@ class FileSeries:
         """The times of the rows, s."""
         times = self._read(_TIME_COLUMN, "time")
         if not len(times):
-            raise ConfigError(f"{self.path}: has no rows")
+            raise ConfigError(f"{self.path}: has no rows; expected at least one")
         rises = np.diff(times) > 0
         if not rises.all():
             at = int(np.argmin(rises))
             raise ConfigError(
                 f"{self.path}: the times do not ascend in row {at + 2}: {times[at + 1]:g} s "
-                f"after {times[at]:g} s; expected each row later than the one before: put the rows "
+                f"after {times[at]:g} s; expected each row later than the one before; put the rows "
                 "in order, each time once"
             )
         return times
@@ -71,7 +71,7 @@ class FileSeries:
         if name not in self._headings:
             raise ConfigError(
                 f"{self.path}: no column {name!r}; it has {', '.join(self._headings) or 'none'}; "
-                f"expected such as '{name} [{units.SI_UNITS[dimension]}]'"
+                f"expected a column such as '{name} [{units.SI_UNITS[dimension]}]'"
             )
         heading, unit = self._headings[name]
         try:
@@ -95,8 +95,8 @@ class FileSeries:
         if not present.all():
             raise ConfigError(
                 f"{self.path}: column {heading!r}: a number is missing in row "
-                f"{1 + int(np.argmin(present))}; expected one a row: leave out the row, or fill it "
-                "in"
+                f"{1 + int(np.argmin(present))}; expected one in each row; remove the row, or add "
+                "the number"
             )
         return np.asarray(values * factor + offset)
 
@@ -111,7 +111,7 @@ class FileSeries:
         except FileNotFoundError:
             raise ConfigError(
                 f"{self.path}: no such file; expected a CSV or Parquet file with columns such as "
-                "'time [s]': mend its name"
+                "'time [s]'; correct its name"
             ) from None
         except (OSError, pa.ArrowException) as error:
             raise self._unreadable(error) from error
@@ -129,7 +129,7 @@ class FileSeries:
         if _TIME_COLUMN not in headings:
             raise ConfigError(
                 f"{self.path}: no column 'time'; it has {', '.join(headings) or 'none'}; expected "
-                "such as 'time [s]'"
+                "a column such as 'time [s]'"
             )
         return headings
 
@@ -154,18 +154,18 @@ def make_sampled(values: Array, rate: float) -> Profile:
 
 
 def make_steps(starts: Sequence[float], values: Sequence[float]) -> Profile:
-    """Return piecewise constant values from their times on; the first one also before."""
+    """Return a profile with each value from its start, s, on; the first value also before it."""
     at, levels = np.array(starts), np.array(values)
     return lambda times: levels[np.maximum(np.searchsorted(at, times, side="right") - 1, 0)]
 
 
 def make_day_cycle(mean: float, amplitude: float, period: float, highest: float) -> Profile:
-    """Return mean + amplitude cos(2 pi (t - highest) / period)."""
+    """Return the profile mean + amplitude cos(2 pi (t - highest) / period); times in s."""
     return lambda times: mean + amplitude * np.cos(2.0 * math.pi * ((times - highest) / period))
 
 
 def make_warm_up(start: float, end: float, time_constant: float, begin: float) -> Profile:
-    """Return start to end as 1 - e^(-(t - begin) / time_constant); start before ``begin``."""
+    """Return the profile start + (end - start) (1 - e^-x), x = (t - begin) / time_constant > 0."""
     return lambda times: (
         start + (end - start) * -np.expm1(-np.maximum(times - begin, 0.0) / time_constant)
     )
@@ -180,7 +180,7 @@ class FileColumn:
     values: Array
 
     def __call__(self, times: Array) -> Array:
-        """Interpolate the column."""
+        """Return the values at times, s, interpolated linearly."""
         return np.interp(times, self.times, self.values)
 
 

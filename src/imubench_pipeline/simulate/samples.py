@@ -57,15 +57,15 @@ def simulate(
     Parameters
     ----------
     model : NoiseModel, an estimate, or a mapping of channels to either
-        Of a mapping, such as the result of `imubench_pipeline.estimate`, all are simulated.
+        All channels of a mapping, such as a result of `imubench_pipeline.estimate`, are simulated.
     rate : float or str
         Hz, or with its unit: ``"100 Hz"``.
     samples : int, optional
-        Length of the log; this, or the duration.
+        Number of samples; either this or ``duration`` is needed.
     rng : numpy.random.Generator, optional
-        This, or a seed; by default the samples differ in each call.
+        Random generator, instead of ``seed``. Without both, the samples differ in each call.
     duration : float or str, optional
-        s, or with its unit: ``"2 h"``.
+        Length of the log in s, or with its unit: ``"2 h"``.
     seed : int, optional
         The same seed gives the same samples. The channels of a mapping have independent samples,
         which do not depend on the other channels.
@@ -99,7 +99,7 @@ def simulate(
     if duration is not None:
         samples = round(parse_setting(duration, "time", "duration") * frequency)
     if samples is None or isinstance(samples, bool) or int(samples) != samples or samples < 1:
-        raise ValueError(f"{samples} samples; expected a whole number from 1")
+        raise ValueError(f"samples is {samples}; expected a whole number of 1 or more")
     number = int(samples)
     if rng is not None and seed is not None:
         raise ValueError("rng and seed are both given; expected one of them")

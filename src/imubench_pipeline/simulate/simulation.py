@@ -174,8 +174,6 @@ def simulate_blocks(
 
 
 class _Axis:
-    """An axis that is being simulated."""
-
     def __init__(
         self, model: SensorModel, rate: float, samples: int, rng: np.random.Generator
     ) -> None:
@@ -248,7 +246,7 @@ class _Axis:
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
     ) -> Array:
-        """Return the next samples."""
+        """Return the samples ``start`` to ``stop``, which must follow the last ones."""
         model, rate = self._model, self._rate
         size = stop - start
         entering = np.full(size, model.bias)
@@ -285,5 +283,5 @@ class _Axis:
 def _check_signal(values: Array, what: str) -> Array:
     signal = np.ascontiguousarray(values, dtype=np.float64)
     if not np.isfinite(signal.sum()):
-        raise ValueError(f"{what} has values that are not finite")
+        raise ValueError(f"{what} has values that are not finite; expected finite numbers only")
     return signal

@@ -71,7 +71,7 @@ def write_log(
 
 
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
-    """Return the notes of a log of this file name, with its format if the sensor has another."""
+    """Return the notes of the log file ``name``: ``words`` as comments, and its log format."""
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
     notes = {"device": "simulated", "simulated": True, "log": diff_settings(own, base)}
@@ -105,7 +105,7 @@ def check_notes(notes: Path, path: Path) -> None:
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
-    """Return the format of a log at a rate, Hz; ConfigError if its suffix is not supported."""
+    """Return the log format to write to ``path`` at a rate, Hz; ConfigError for other suffixes."""
     if path.suffix not in FORMATS:
         raise ConfigError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}")
     names = list(columns)

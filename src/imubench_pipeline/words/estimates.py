@@ -40,10 +40,7 @@ def symbol_text(symbol: str) -> str:
 
 
 def estimate_text(row: ParameterRow, unit: numbers.Unit, duration: float | None) -> str:
-    """Return why a parameter has no plain value, in sentences; may be empty.
-
-    ``duration`` is the length of the recording, s.
-    """
+    """Return the reason for the status of an estimate; ``duration``: length of the recording, s."""
     symbol, status = symbol_text(row.parameter), row.status
     if status == "ok":
         return f"{symbol}: {row.reason.rstrip('.')}." if row.reason else ""
@@ -81,7 +78,7 @@ def precision_text(row: ParameterRow, unit: numbers.Unit) -> str:
 
 
 def model_text(name: str) -> str:
-    """Return the terms of a model with its number of spectral lines: ``N+F + 3 lines``."""
+    """Return a model with its number of spectral lines: ``N+F + 3 spectral lines``."""
     terms = name.split("+")
     lines = terms.count("S")
     rest = "+".join(term for term in terms if term != "S")

@@ -25,7 +25,10 @@ Span = tuple[float, float]
 def state_text(
     row: RecordingRow, length: str, events: Sequence[int] = (), moved: bool = False
 ) -> str:
-    """Return the state of a recording in a line; ``events``: numbers of those that cast doubt."""
+    """Return the state of a recording in a line: ``log: at rest; usable; 2 h at 100 Hz``.
+
+    ``length`` ends the line; ``events`` are the numbers of the events that cast doubt.
+    """
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
     state = FITNESS_WORDS.get(row.fitness, "not judged")
@@ -41,7 +44,7 @@ def reason_text(row: RecordingRow) -> str:
 
 
 def motion_text(channels: Sequence[str], moved: Sequence[Span], still: Sequence[Span]) -> str:
-    """Return that the sensor was not at rest, its rests, and how to use them."""
+    """Return when the sensor moved and when it was at rest, s, and how to use its rests."""
     where = f"the sensor was moved ({channels_text(channels)}) at {_spans_text(moved)}"
     if not still:
         return (
@@ -61,7 +64,7 @@ def _spans_text(spans: Sequence[Span]) -> str:
 
 
 def missing_axes_texts(analysed: Collection[str], named: Collection[str]) -> list[str]:
-    """Return a sentence for each sensor whose axes are not all analysed; ``named``: by findings."""
+    """Return sentences on axes that are not analysed; ``named``: channels that findings name."""
     texts = []
     for quantity, name in (("gyro", "Gyroscope"), ("accel", "Accelerometer")):
         axes = [axis for axis in "xyz" if f"{quantity}_{axis}" not in analysed]
@@ -75,7 +78,7 @@ def missing_axes_texts(analysed: Collection[str], named: Collection[str]) -> lis
 
 
 def longer_log_text(times: Mapping[str, tuple[float, float]]) -> str:
-    """Return how long logs would determine parameters; ``times``: least and most by symbol, s."""
+    """Return the length of log that parameters need; ``times``: least and most, s, by symbol."""
     parts = []
     for symbol, (least, most) in times.items():
         low, high = duration_text(least, 1), duration_text(most, 1)
@@ -101,7 +104,7 @@ def events_text(
     system: System = "practical",
     factors: Mapping[str, float] | None = None,
 ) -> str:
-    """Return an event in sentences; ``factors``: change of parameters without its removal."""
+    """Return one event in sentences; ``factors``: of parameters, if it is not removed."""
     first = max(findings, key=lambda row: abs(row.value or 0.0))
     if len(findings) == 1:
         return finding_text(first, system)

@@ -21,7 +21,7 @@ NO_VALUE = "–"
 
 
 def number_text(value: float | None, digits: int = 4) -> str:
-    """Return a number rounded to some digits, with a power of ten where it is small or large.
+    """Return a number with ``digits`` significant digits, and a power of ten if small or large.
 
     None and NaN are `NO_VALUE`. Halves are rounded away from zero. ``numberText`` in
     ``report/static/numbers.js`` gives the same texts; a test compares them.
@@ -56,7 +56,7 @@ def counted(number: int, singular: str, plural: str | None = None) -> str:
 
 
 def join_names(names: Sequence[str], by: str = "and") -> str:
-    """Return names as a list in a sentence: ``x, y and z``."""
+    """Return names as a list in a sentence, with ``by`` before the last: ``x, y and z``."""
     return f" {by} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
@@ -67,7 +67,7 @@ def join_first(texts: Sequence[str], most: int) -> str:
 
 
 def digit_limits(parameter: str = "") -> tuple[int, int]:
-    """Return the minimum and maximum digits of a parameter, or of any other value."""
+    """Return the minimum and maximum digits of a parameter, or by default of any value."""
     return DIGITS.get(parameter) or DIGITS["default"]
 
 
@@ -76,9 +76,9 @@ def count_digits(
 ) -> int:
     """Return the number of significant digits of a value and its limits, from its interval.
 
-    The last digit is the first of half the interval, or the second where that begins with 1, and
-    the limits differ as printed. An upper limit alone is an interval from 0. ``countDigits`` in
-    ``report/static/numbers.js`` does the same.
+    The last digit is at the place of the first digit of half the interval, or of the second if it
+    begins with 1. There are more digits if the limits would be equal as printed. An upper limit
+    without a value is an interval from 0. ``report/static/numbers.js`` does the same.
     """
     least, most = digit_limits(parameter)
     digits = _DIGITS_WITHOUT_INTERVAL
@@ -101,7 +101,7 @@ def _find_first_digit(value: float) -> int:
 
 
 def duration_text(seconds: float | None, digits: int = 3) -> str:
-    """Return a time in a suitable unit; `NO_VALUE` if there is none."""
+    """Return a time, given in s, in a suitable unit; `NO_VALUE` if there is none."""
     if seconds is None:
         return NO_VALUE
     for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
@@ -129,14 +129,14 @@ def degrees_text(angle: float | None, digits: int = 4) -> str:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit in which a figure is shown: its sign, and the factor from SI."""
+    """A unit in which a figure is shown: its symbol, and its value of one SI unit."""
 
     sign: str
     per_si: float
-    parameter: str = ""  # sets the digits
+    parameter: str = ""  # sets the number of digits, as in `DIGITS`
 
     def text(self, value: float | None, digits: int | None = None) -> str:
-        """Return an SI value in this unit, rounded to some digits; a dash if there is none."""
+        """Return an SI value in this unit; ``digits`` None: by `digits`; a dash without a value."""
         if digits is None:
             digits = self.digits(value, None, None)
         return number_text(None if value is None else value * self.per_si, digits)
@@ -163,7 +163,7 @@ class Unit:
 def interval_text(
     lower: float | None, upper: float | None, unit: Unit, value: float | None = None
 ) -> str:
-    """Return ``lower to upper``, with the digits of a value; a dash if they are not known."""
+    """Return ``lower to upper`` (SI) in a unit, to the digits of ``value``; a dash if unknown."""
     if lower is None or upper is None:
         return NO_VALUE
     digits = unit.digits(value, lower, upper)

@@ -199,7 +199,7 @@ def worse_than_class_text(quantity: str, cause: Cause, size: float) -> str:
 
 
 def class_limit_text(quantity: str, source: SourceCode, size: float | None) -> str:
-    """Return the figure of the class, SI, that counts for one that is not printed; None: noise."""
+    """Return the worst figure of a class, assumed if none is printed; ``size``: None for noise."""
     figure = ""
     if size is None:
         name = {"N": "white noise", "flicker": "bias instability"}.get(source, source)
@@ -224,7 +224,8 @@ def _name_property(of: verdicts.Property, subject: str) -> str:
 def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
-        return f"price class {shortfall.subject or 'not stated'}, required: a class with {shortfall.asked}"
+        stated = shortfall.subject or "not stated"
+        return f"price class {stated}, required: a class with {shortfall.asked}"
     name = _name_property(shortfall.property, shortfall.subject)
     _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":
@@ -325,7 +326,7 @@ def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
 
 
 def doubts_text(doubts: Iterable[verdicts.DoubtMark], *, named: bool = False, most: int = 3) -> str:
-    """Return doubts about recordings in words, the first few; ``named``: with the recording."""
+    """Return the first ``most`` doubts about recordings; ``named``: with recordings' names."""
     texts = list(
         dict.fromkeys(
             f"{doubt.recording}: " * named + doubt_text(doubt.code, doubt.channels)
@@ -336,12 +337,12 @@ def doubts_text(doubts: Iterable[verdicts.DoubtMark], *, named: bool = False, mo
 
 
 def used_doubts_text(row: comparisons.RankingRow) -> str:
-    """Return the doubts about the recordings of a row of ``ranking``, named if they are several."""
+    """Return doubts about the recordings of a row of ``ranking``, by name if there are several."""
     return doubts_text(row.doubts, named=(row.recordings or 0) > 1)
 
 
 def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -> str:
-    """Return the margins other than in use: ``noise alone 4.2, likely 0.9``."""
+    """Return the further margins of a row: ``noise alone 4.2, likely margin 0.9``."""
     parts = []
     if row.noise_margin is not None:
         parts.append(f"noise alone {number_text(row.noise_margin, 3)}")
@@ -364,7 +365,7 @@ _ANSWERS: Mapping[Verdict, str] = {
 
 
 def sensor_answer_text(judged: Iterable[tuple[str, Verdict]]) -> str:
-    """Return for which requirements a sensor serves, by title and verdict, in a sentence or two."""
+    """Return a sentence per verdict with its requirements; ``judged``: title and verdict."""
     titles: dict[Verdict, list[str]] = {}
     for title, verdict in judged:
         titles.setdefault(verdict, []).append(title)
@@ -384,7 +385,7 @@ def spread_text(row: comparisons.RankingRow) -> str:
 
 
 def corrected_text(row: comparisons.RankingRow) -> str:
-    """Return the verdict with a corrected unit, or with the recordings that are not used."""
+    """Return the verdicts that unused recordings give, as logged and with corrected units."""
     parts = []
     if row.logged_verdict is not None:
         parts.append(f"{_describe_outcome(row.logged_verdict, row.logged_margin)} as logged")
@@ -415,10 +416,10 @@ def _describe_outcome(verdict: Verdict, margin: float | None) -> str:
 def answer_text(
     rows: Sequence[comparisons.RankingRow], names: Mapping[str, str], asked: int, excluded: int = 0
 ) -> str:
-    """Return the recommended sensors in one line, the best first; only judged ones.
+    """Return the best sensor for a requirement, with verdict and evidence, in sentences.
 
     ``rows`` are the deciding rows of the judged sensors, the best first. ``asked`` is the number of
-    sensors, judged or not; ``excluded`` the number of those that lack a required property.
+    all sensors; ``excluded`` is the number of sensors that lack a required property.
     """
     having = "the required properties and usable data" if excluded else "usable data"
     if not rows:
@@ -450,10 +451,10 @@ def answer_text(
 def summary_text(
     best: Mapping[str, comparisons.RankingRow | None], names: Mapping[str, str]
 ) -> str:
-    """Return the recommended sensors for all requirements in one sentence.
+    """Return the best sensor for each requirement, in sentences.
 
-    ``best`` is the deciding row of the best judged sensor by the name of the requirement in words,
-    None without one; ``names`` are the sensors in words.
+    ``best`` has, by title of the requirement, the deciding row of the best judged sensor; None if
+    none is judged. ``names`` has the shown name of each sensor.
     """
     groups: dict[tuple[str, str], list[str]] = {}
     for requirement, row in best.items():
@@ -481,7 +482,7 @@ _MAX_NAMES = 4  # maximum number of sensors that are named with one verdict
 
 
 def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]) -> list[str]:
-    """Return the sensors, or their number, by verdict, from their deciding rows."""
+    """Return a line per verdict with its sensors, or their number, from the deciding rows."""
     by_heading: dict[str, list[str]] = {}
     listed = list(rows)
     for verdict in get_args(Verdict):
@@ -505,10 +506,7 @@ _SINGULAR = re.compile(r"\b([Mm]eet|[Ff]ail)s\b")
 
 
 def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:
-    """Return a next step: ``Record 3 more units: this could settle 1 verdict``.
-
-    ``brief``: without how to measure a figure.
-    """
+    """Return a next step: ``Record 3 more units: this could settle 1 verdict``, or ``brief``."""
     parts = []
     if step.verdicts_turned:
         changed = counted(step.verdicts_turned, "verdict")

@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
 def select(
     tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
 ) -> dict[str, pa.Table]:
-    """Return the rows of a sensor, recording and channel, None: all; `CommandError` if none."""
+    """Return the tables, with only the given sensor, recording and channel; None: all of them."""
     chosen = dict(tables)
     for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
         if asked is None:
@@ -125,7 +125,7 @@ def select(
             # A recording, or all recordings of a sensor, may have no curve for a reason.
             named = _select_rows(chosen["recordings"], column, asked)
             reasons = [
-                f" but a {row.status} one ({row.reason})"
+                f" with a curve; status {row.status} ({row.reason})"
                 for row in RecordingRow.rows_of(named)
                 if row.status != "ok" and column != "channel"
             ]
@@ -135,7 +135,7 @@ def select(
             )
         chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
-        raise CommandError("the results have no curve: no recording could be used")
+        raise CommandError("found no curve, as no recording is usable; see imubench show")
     return chosen
 
 
@@ -150,7 +150,6 @@ def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
 def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> "Iterator[tuple[str, Make]]":
-    """Yield name and maker of each selected figure."""
     from imubench_pipeline.extensions.figures import figures as files
     from imubench_pipeline.extensions.figures.curves import draw_theory_figure
     from imubench_pipeline.report.view import gather_recordings

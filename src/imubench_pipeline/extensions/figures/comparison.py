@@ -141,17 +141,17 @@ def _draw_sensor(
 
 @dataclass(frozen=True)
 class Mark:
-    """The mark of one estimate."""
+    """The mark of one estimate in the figure that compares parameters."""
 
     place: float  # distance from the top, mm
     kind: Kind
-    value: float | None  # or the limit, or the fitted value that is not identified
+    value: float | None  # by kind: estimate, fitted value that is not identified, or limit
     lower: float | None = None  # 95 % limits
     upper: float | None = None
 
 
 def make_mark(view: ChannelView, symbol: str, place: float) -> Mark | None:
-    """Return the mark of one of the compared parameters at a place, if it has a value or limit."""
+    """Return the mark of a parameter at a place, mm from the top; None without value or limit."""
     rows = view.named(view.recommended, symbol) if view.recommended in view.parameters else []
     for row in rows:
         if row.value is not None:
@@ -184,7 +184,7 @@ def draw_forest_figure(
     sensors: Sequence[str],
     system: System = "practical",
 ) -> Figure:
-    """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
+    """Draw parameters of one channel of all sensors, with 95 % limits: a panel per parameter."""
     looks = assign_sensor_styles(list(sensors))
     # The height of the row of a sensor grows with its recordings, up to a page in all.
     by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}

@@ -95,7 +95,7 @@ def draw_grade_bands(axes: Axes, quantity: str, scale: float) -> None:
 
 
 def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: float) -> Figure:
-    """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
+    """Finish a figure: axis limits for the curve and the levels ``more``, grades, legend."""
     limits = (view.lower, view.upper)
     near = [np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale for limit in limits]
     style.set_log_axis(axes, "x", style.compute_limits(view.tau))
@@ -109,7 +109,7 @@ def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: f
 
 @style.set_style()
 def draw_allan_figure(view: ChannelView, system: System = "practical") -> Figure:
-    """Draw the Allan deviation with its 95 % limits alone (Silva et al., Figure 2)."""
+    """Draw only the Allan deviation, with its 95 % limits (Silva et al., Figure 2)."""
     figure, axes, scale = make_channel_axes(view, system, "Allan deviation")
     draw_measured(axes, view, scale)
     return finish(figure, axes, view, scale)
@@ -280,8 +280,8 @@ def _label_term(view: ChannelView, term: Term, system: System) -> str:
 def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the curve and the recommended model with the lines that the datasheet prints.
 
-    N is a line of slope -1/2, K one of +1/2; a bias instability is the level of the minimum, as
-    vendors mean it. None where the datasheet has no such figure.
+    N is a line of slope -1/2, and K a line of slope +1/2. A bias instability is the level of the
+    minimum, as vendors mean it. None if the datasheet has no such figure.
     """
     # Each reading once, with its value in SI.
     printed = {
@@ -411,7 +411,7 @@ DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
 CHARACTERISTIC = NoiseModel(
     N=20.0 * DEGREE_PER_HOUR, B=10.0 * DEGREE_PER_HOUR, K=0.4 * DEGREE_PER_HOUR
 )
-"""A gyroscope whose three slopes are seen, each over a decade or more: rad/s and s."""
+"""A gyroscope that shows each of the three slopes for a decade of tau or more: rad/s and s."""
 
 _DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
 

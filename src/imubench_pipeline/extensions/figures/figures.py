@@ -45,7 +45,7 @@ def list_cross_figures(
     sensors: Sequence[str] | None = None,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Yield name and maker of each figure of all sensors; all ``sensors`` give the colours."""
+    """Yield name and maker of each figure that compares sensors; ``sensors`` give the colours."""
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):
         chosen = [view for view in views if view.channel == channel]
@@ -65,7 +65,7 @@ def list_channel_figures(
 
 
 def write_figures(tables: Iterable[Path], system: System, figures: Path) -> None:
-    """Write a folder of figures of each channel of all sensors; all appear together."""
+    """Write the folder of figures that compare sensors; it appears when it is complete."""
     with make_folder(figures) as folder:
         for draw in list_drawings(
             {file.stem: read(file.stem, [file]) for file in tables}, system, folder
@@ -80,7 +80,7 @@ def list_drawings(
     *,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Sequence[Callable[[], None]]:
-    """Return a function for each figure that writes it as SVG and PDF; missing tables are empty."""
+    """Return functions that each write a figure as SVG and PDF; missing tables count as empty."""
     folder.mkdir(parents=True, exist_ok=True)
     unused = {name: make_schema(name).empty_table() for name in BY_RECORDING}
     views = gather_recordings(unused | dict(tables))

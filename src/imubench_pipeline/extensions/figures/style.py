@@ -104,7 +104,7 @@ SYMBOLS = {
 }
 SYMBOLS |= {"B_curve": "$B$ of the curve", "sigma_min": r"$\sigma_\mathrm{min}$"}
 SYMBOLS |= {"tau_min": r"$\tau_\mathrm{min}$"}
-"""The parameters as they are set; a logarithmic axis has no sign of R."""
+"""The parameters in TeX notation; R is a magnitude, since axes are logarithmic."""
 
 
 def name_channel(channel: str) -> str:
@@ -142,7 +142,7 @@ def convert_marker_style(look: Appearance, *, hollow: bool = False) -> Look:
 
 
 def make_figure(width: float, height: float, title: str) -> Figure:
-    """Return an empty figure, in mm, to which a legend adds; the title is for its metadata."""
+    """Return an empty figure of a size in mm; the title is for the metadata of its file."""
     figure = Figure(figsize=(width / 25.4, height / 25.4))
     figure.set_label(title)
     return figure

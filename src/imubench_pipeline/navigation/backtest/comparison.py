@@ -72,10 +72,10 @@ attitude error of a gyro projects gravity into velocity and position."""
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """One dead-reckoning error of one channel."""
+    """A dead-reckoning error from one channel: its bias is measured at rest, before the motion."""
 
     order: int  # m: number of integrations minus one
-    # rest, time: W at rest, whose mean is the bias, and t in motion, s
+    # rest, time: the time W at rest, whose mean is the bias, and the time t in motion, s
     rest: float
     time: float
     factor: float = 1.0  # multiplier of the integral
@@ -86,7 +86,7 @@ class DeadReckoning:
         return MIN_WINDOWS * (self.rest + self.time)
 
     def sigma(self, model: NoiseModel) -> float:
-        """Return the standard deviation of the error, from the error budget of a noise model."""
+        """Return the standard deviation of the error by a noise model, rad, m/s or m."""
         start = Calibrated(self.rest)
         parts = of_sensor("gyro", model, self.order, self.time, start, self.factor)
         return math.hypot(*(part.sigma for part in parts))
@@ -171,7 +171,7 @@ def _compare(
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
-    """Yield a finding for each channel that contradicts its budget: the least p-value."""
+    """Yield a finding for each channel that contradicts its budget, for its least p-value."""
     by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:
         if row.contradicted and row.chance is not None and row.ratio is not None:
@@ -206,9 +206,9 @@ def list_backtest_rows(
     """Yield the rows of the table ``backtest`` of a recording.
 
     The logs are used as recorded, with lines, temperature drift and other ``deterministic``
-    signals, which the models do not include, since a user of the sensor gets them too. ``names``
-    are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel; ``draws``
-    the number of noise models drawn from each. Each channel has its own random stream of the seed.
+    signals. The models do not include these, but a user of the sensor gets them. ``names`` has
+    ``sensor`` and ``recording``. ``estimates`` has the recommended estimate of each channel, from
+    which ``draws`` noise models are drawn. Each channel has its own random stream of the seed.
     """
     apart: dict[str, dict[str, None]] = {}
     for component in deterministic:
@@ -239,7 +239,6 @@ def _test_channel(
     draws: int,
     seed: int,
 ) -> Iterator[BacktestRow]:
-    """Yield the rows of one channel."""
     listed: list[tuple[BacktestRow, DeadReckoning | str]] = []
     for name, requirement in requirements.items():
         for limit in requirement.by_dead_reckoning:

@@ -41,7 +41,7 @@ class Window:
 
     @property
     def blocks(self) -> int:
-        """Blocks of the whole window."""
+        """Number of blocks in the whole window."""
         return self.resting + self.moving
 
     @property
@@ -67,7 +67,7 @@ class Window:
 
 
 def choose_window(rest: float, time: float, rate: float) -> Window | None:
-    """Return a window whose blocks divide W and t, s, evenly; None if one has no sample."""
+    """Return a window whose blocks divide both times, s, evenly; None if one has no sample."""
     shorter, longer = sorted((rest, time))
     # A rate that is estimated from time stamps may be slightly low.
     most = math.floor(1.001 * shorter * rate)
@@ -90,16 +90,16 @@ def choose_window(rest: float, time: float, rate: float) -> Window | None:
 
 @dataclass(frozen=True)
 class Errors:
-    """The errors of the windows of a log."""
+    """Statistics of the errors in the windows of a log."""
 
     mean_square: float  # of the errors; rad^2, (m/s)^2 or m^2. NaN without a window
     count: int  # number of windows without a gap
-    # shape (lags,); pairs of windows that begin so many blocks apart, from 0; in one segment only
+    # shape (lags,): number of pairs of windows of one segment that begin 0, 1, ... blocks apart
     pairs: Array
 
 
 def compute_window_errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
-    """Return the errors of all windows, by block means of segments (NaN: missing) and weights."""
+    """Return the errors in all windows: sums of block means (NaN: missing) times weights."""
     total, count = 0.0, 0
     pairs = np.zeros(lags)
     for segment in means:
@@ -137,10 +137,10 @@ def average_blocks(
 ) -> dict[float, list[Array]]:
     """Return the means of consecutive blocks of each segment, NaN where samples are missing.
 
-    ``parts`` are the log in order, NaN where a sample is missing; ``segments`` the first and
-    one-past-last sample of each; the rate is in Hz, the ``lengths`` of the blocks in s. Block sizes
-    differ by one sample if the samples do not divide evenly. The means are by length, for each
-    segment, in rad/s or m/s^2, less a constant of the log.
+    ``parts`` are consecutive parts of the log, NaN where a sample is missing. ``segments`` are the
+    first sample of each segment and the sample after its last. ``rate`` is in Hz; ``lengths`` of
+    blocks are in s. Block sizes differ by one sample if the samples do not divide evenly. The
+    result has, by length and segment, the means minus a constant of the log, rad/s or m/s^2.
     """
     edges: dict[float, list[NDArray[np.int64]]] = {}
     for length in lengths:
@@ -199,7 +199,7 @@ _MIN_RELATIVE_VARIANCE = 1e-12
 class Spread:
     """Distribution of the mean square of the errors of a log, from a noise model."""
 
-    # mean, variance: of the mean square: rad^2, (m/s)^2 or m^2, and its square
+    # mean of the mean square, rad^2, (m/s)^2 or m^2; its variance, in the square of this unit
     mean: float
     variance: float
 
@@ -226,11 +226,11 @@ class WindowCovariance:
 
     @property
     def lags(self) -> int:
-        """Number of lags, from 0."""
+        """Number of lags, in blocks from 0, for which the covariance is calculated."""
         return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
-        """Return the covariance of errors by lag in blocks, (lags,), SI^2, of noise only."""
+        """Return the covariance, SI^2, of errors from noise by lag in blocks, shape (lags,)."""
         total = np.zeros(self.lags)
         pairs = np.correlate(self.weights, self.weights, "full")  # from -(blocks - 1) to blocks - 1
         reach = self.window.blocks - 1

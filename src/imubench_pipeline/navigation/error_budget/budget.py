@@ -48,20 +48,20 @@ _CROSSING_POINTS = 4096
 class Start:
     """Initial conditions of dead reckoning.
 
-    A levelled tilt is the mean error of the accelerometers over their static window, over g. It
-    cancels that error, so only the later departure from it has an effect on velocity and position.
+    A levelled tilt is the mean error of the accelerometers in their static window, divided by g.
+    It cancels this error, so that only later changes of it act on velocity and position.
     """
 
     gyro: SensorStart
     accel: SensorStart
-    # initial tilt: None: levelled by the accelerometers; or its 1 sigma, rad, if it has another
-    # source that is independent of the calibration of the accelerometers
+    # initial tilt, 1 sigma, rad, from a source that is independent of the accelerometers; None:
+    # levelled by the accelerometers
     tilt: float | None = 0.0
     heading: float = 0.0  # initial heading error, 1 sigma, rad
 
     @classmethod
     def calibrated(cls, window: float) -> "Start":
-        """Return a levelled start with both biases from one static window, s."""
+        """Return a levelled start; the means of the static window, s, give the sensors' biases."""
         return cls(gyro=Calibrated(window), accel=Calibrated(window), tilt=None)
 
 
@@ -86,8 +86,8 @@ def budget(
     separate contribution; every other term has one, since window and motion are correlated.
 
     The time t is in s. The gyro is across the axis, or for the heading points up; the accelerometer
-    is along the axis, and the heading does not need it. The figures of these axes are other than
-    noise.
+    is along the axis, and the heading does not need it. ``gyro_figures`` and ``accel_figures`` are
+    the sizes of errors other than noise, by cause.
 
     References
     ----------
@@ -124,7 +124,7 @@ def budget(
 
 
 def get_angle_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
-    """Return the factor of the integrated angle: gravity for a tilt, the speed for a heading."""
+    """Return the factor of the integrated angle: gravity for a tilt, the speed for a track."""
     if quantity == "cross_track":
         return use.speed
     return STANDARD_GRAVITY if GYRO_ORDER[quantity] > 0 else 1.0
@@ -133,7 +133,6 @@ def get_angle_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
 def _list_levers(
     quantity: parts.Quantity, time: float, start: Start, use: in_use.Use
 ) -> Iterator[tuple[Measured, in_use.Lever]]:
-    """Yield the sensor and the lever of each figure."""
     order, factor = GYRO_ORDER[quantity], get_angle_factor(quantity, use)
     direct = quantity == "heading"  # vehicles turn about the vertical
     levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=direct)
@@ -176,11 +175,11 @@ def of_sensor(
 def time_until(
     limit: float, at: Callable[[float], parts.Budget], *, oscillates: bool = False
 ) -> float | None:
-    """Return the time after which an error reaches a limit; ``at`` returns its budget after a time.
+    """Return the time, s, at which an error reaches a limit; ``at`` returns the budget at a time.
 
     The total of a `budget` increases with time, because the errors at two times never have a
     negative correlation. With lines or turns it may oscillate; if ``oscillates``, as with lines,
-    the first crossing is found among 4096 times. The time is in s: 0 if the error exceeds the limit
+    the first crossing is found among 4096 times. The result is 0 if the error exceeds the limit
     from the beginning, None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m.
     """
 

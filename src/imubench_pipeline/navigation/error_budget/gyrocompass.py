@@ -1,9 +1,9 @@
 """Heading error of gyrocompassing: north from the Earth's rate, at rest.
 
 An error dw of the mean of a horizontal gyro across north gives a heading error of
-dw / (w_ie cos(latitude)). A levelling error about north, the bias of the accelerometer over g,
-turns the upright part of the Earth's rate into that gyro: a heading error of tan(latitude) times
-the tilt. At several positions, with half turns between, both biases cancel. Large angles are
+dw / (w_ie cos(latitude)). A tilt about north, the bias of the accelerometer divided by g,
+projects the vertical part of the Earth's rate onto that gyro: a heading error of tan(latitude)
+times the tilt. At several positions, with half turns between, both biases cancel. Large angles are
 neglected.
 """
 

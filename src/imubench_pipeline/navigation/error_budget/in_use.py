@@ -41,14 +41,14 @@ class Figure:
     """Size of an error of one axis."""
 
     sigma: float  # 1 sigma, SI
-    # likely, best: if the figure is a limit of the class: its median and its best; else None
+    # likely, best: median and best of the class, if sigma is the worst of the class; else None
     likely: float | None = None
     best: float | None = None
     origin: Origin = "measured"
     spread: float = 0.0  # 1 sigma of the figure itself, if it is an estimate
 
     def at(self, end: End) -> "Figure":
-        """Return the figure with the median or the best of its class, if it is a limit of it."""
+        """Return the figure; if it is the worst of a class, with the class's median or best."""
         value = {"in_use": None, "likely": self.likely, "best": self.best}[end]
         return self if value is None else replace(self, sigma=value)
 
@@ -79,9 +79,10 @@ NO_USE = Use()
 
 
 def of_pulse(order: int, time: float, over: float) -> float:
-    """Return the growth of a unit error that lasts for T: c(t) - c(t - T), see `of_constant`.
+    """Return the growth, s^(m+1), of a unit error that lasts from 0 to T: c(t) - c(t - T).
 
-    ``order`` is m, the number of integrations minus one; t and T are in s, and T begins at 0.
+    c is `of_constant`. ``order`` is m, the number of integrations minus one; t is ``time`` and T is
+    ``over``, both in s.
     """
     return of_constant(order, time) - of_constant(order, max(time - over, 0.0))
 
@@ -89,8 +90,8 @@ def of_pulse(order: int, time: float, over: float) -> float:
 def of_rise(order: int, time: float, over: float) -> float:
     """Return the growth of an error that rises linearly to 1 in a time T, and remains there.
 
-    (c'(t) - c'(t - T)) / T with c' of ``order + 1`` (see `of_constant`): t^(m+1) / (m+2)! at t = T,
-    1 / (m+2) of the growth of a constant 1. The arguments are as in `of_pulse`.
+    This is (c'(t) - c'(t - T)) / T, with c' = `of_constant` of ``order + 1``. At t = T, it is
+    1 / (m+2) times the growth of a constant error of 1. The arguments are as in `of_pulse`.
     """
     return of_pulse(order + 1, time, over) / over
 
@@ -98,7 +99,8 @@ def of_rise(order: int, time: float, over: float) -> float:
 def of_squared_rise(order: int, time: float, over: float) -> float:
     """Return the growth of the square of the error of `of_rise`, s^(m+1).
 
-    2 (c''(t) - c''(t - T) - T c'(t - T)) / T^2, with c' and c'' of ``order + 1`` and ``order + 2``.
+    This is 2 (c''(t) - c''(t - T) - T c'(t - T)) / T^2, with c' and c'' = `of_constant` of
+    ``order + 1`` and ``order + 2``.
     """
     later = of_constant(order + 1, max(time - over, 0.0))
     return 2.0 * (of_pulse(order + 2, time, over) - over * later) / over**2
@@ -111,10 +113,11 @@ Lever = tuple[Cause, float | complex, SourcePath | None]
 def list_levers(
     measured: Measured, order: int, time: float, start: SensorStart, use: Use, *, direct: bool
 ) -> Iterator[Lever]:
-    """Yield the levers of the causes that occur in a use, for an error along one axis.
+    """Yield, for each cause in a use, the lever: the error along one axis from a figure of 1.
 
-    ``order`` is m, 0 to 2, the time in s. ``direct``: the sensor measures the quantity of the error
-    or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the use.
+    ``order`` is m, 0 to 2; ``time`` is in s. ``direct``: the sensor measures the quantity of the
+    error or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the
+    use.
     """
     constant = of_constant(order, time)
     calibrated = isinstance(start, Calibrated)
@@ -160,8 +163,8 @@ def list_turn_levers(
 ) -> Iterator[Lever]:
     """Yield the levers of a turn at speed, for attitude, heading, velocity and position.
 
-    ``levelled``: the tilt was found by the accelerometers. It cancels a constant error of these,
-    until a turn carries the error with the vehicle, and leaves the tilt behind.
+    ``levelled``: the initial tilt is from the accelerometers. It cancels their constant error until
+    the vehicle turns, because the error turns with the vehicle and the tilt does not.
     """
     if use.turns <= 0.0:
         return
@@ -206,7 +209,7 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 
 
 def read_figures(sensor: Sensor | None, quantity: str) -> dict[Cause, Figure]:
-    """Return the figures of the errors in use of a quantity: printed, or limits of the class."""
+    """Return the sizes of a quantity's errors in use: printed, or the worst of the class."""
     figures: dict[Cause, Figure] = {}
     for cause in STATEMENTS:
         if (quantity, cause) == ("accel", "g_sensitivity"):

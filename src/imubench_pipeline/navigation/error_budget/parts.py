@@ -33,8 +33,8 @@ class Contribution:
     source: ErrorSource
     sigma: float  # 1 sigma, rad, m/s or m
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
-    # error in the horizontal plane, the real part along the axis; None: along one axis, and alike
-    # along the other
+    # error in the horizontal plane, the real part along the axis; None: an error along the axis,
+    # and an independent one of the same size across it
     vector: complex | None = None
 
 
@@ -49,15 +49,15 @@ class Budget:
 
     @property
     def total(self) -> float:
-        """1 sigma: the root of the sum of the squares of the contributions."""
+        """The error, 1 sigma: the root of the sum of the squares of the contributions."""
         return math.hypot(*(contribution.sigma for contribution in self.contributions))
 
     def to_radius(self, confidence: float) -> "Budget":
         """Return the budget of the error in the plane, of velocity or position.
 
-        A contribution along one axis acts along the other too. The total is the radius within which
-        the error is with the probability ``confidence``, over the number of standard deviations of
-        an error along one axis with that probability.
+        A contribution along one axis acts along the other, too. The total is R / z. With the
+        probability ``confidence``, the error is within the radius R, and an error along one axis is
+        within z standard deviations.
         """
         along = math.fsum(part.sigma**2 for part in self.contributions if part.vector is None)
         vectors = [part.vector for part in self.contributions if part.vector is not None]
@@ -79,10 +79,10 @@ def compute_radius_factor(
     vectors: Sequence[complex | NDArray[np.complexfloating]],
     confidence: float,
 ) -> Array:
-    """Return the radius over z times the root of the sum of the variances along both axes.
+    """Return the factor of `tabulate_radii` for a sum of independent errors, shape () or (draws,).
 
-    ``along`` is the variance of errors that act along each axis; ``vectors`` are the others.
-    Shapes () or (draws,).
+    ``along`` is the variance, along each of two axes, of errors without a direction; ``vectors``
+    are errors with a direction.
     """
     # The variances along the main axes are the mean plus and minus this.
     mean = along + sum(np.abs(vector) ** 2 for vector in vectors) / 2.0
@@ -100,9 +100,9 @@ _ANGLES = 4096
 def tabulate_radii(confidence: float) -> tuple[Array, Array]:
     """Return ratios of the standard deviations along two axes, and factors for the radius.
 
-    A factor is the radius over z times the root of the sum of both variances, with the normal
-    quantile z. The probability within a radius R is the mean over the angle of
-    (1 - exp(-R^2 g / 2)) / (g s1 s2), with g = cos^2 / s1^2 + sin^2 / s2^2.
+    A factor is R / (z sqrt(s1^2 + s2^2)), with the standard deviations s1 and s2 and the two-sided
+    normal quantile z of ``confidence``. The probability within a radius R is the mean, over all
+    angles a, of (1 - exp(-R^2 g / 2)) / (g s1 s2), with g = cos(a)^2 / s1^2 + sin(a)^2 / s2^2.
     """
     ratios = np.linspace(0.0, 1.0, _RADIUS_STEPS)
     z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)

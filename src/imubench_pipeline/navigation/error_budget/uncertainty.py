@@ -14,13 +14,13 @@ from imubench_pipeline.typing import Array
 def compute_limits(
     drawn: Sequence[float] | Array, value: float, tail: float = 0.025
 ) -> tuple[float, float]:
-    """Return 95 % limits of draws, extended to the value: draws of an absent term exceed it."""
+    """Return 95 % limits of draws, extended to include ``value``, as drawn terms may exceed it."""
     lower, upper = np.quantile(drawn, [tail, 1.0 - tail]).tolist()
     return min(lower, value), max(upper, value)
 
 
 def compute_chance_within(limit: float, drawn: Array) -> float:
-    """Return the probability that a total is within a limit, over totals of drawn noise models.
+    """Return the probability that a total is within a limit, from totals of drawn noise models.
 
     It is the integral of a kernel density estimate in log total, with a normal kernel (B. W.
     Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31), so that it is

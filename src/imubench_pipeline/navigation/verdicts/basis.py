@@ -17,7 +17,7 @@ Key = tuple[str, str]  # sensor, recording
 
 @dataclass(frozen=True)
 class Basis:
-    """The recordings of a run, by sensor and name."""
+    """The properties of the recordings of a run, by sensor and name."""
 
     recordings: Mapping[Key, RecordingRow] = field(default_factory=dict)
     doubts: Mapping[Key, Sequence[DoubtRow]] = field(default_factory=dict)

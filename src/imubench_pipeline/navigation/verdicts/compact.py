@@ -37,7 +37,7 @@ Packed = dict[str, Any]
 
 
 def pack_requirement(name: str, requirement: Requirement) -> Packed | None:
-    """Return a requirement; None if it has limits in outages or of north, which are not packed."""
+    """Return a requirement as plain values; None if it has limits in outages or of north."""
     questions = list(list_requirement_questions(name, requirement))
     if requirement.in_outages or any(question.error == "north" for question in questions):
         return None
@@ -74,7 +74,7 @@ def pack_demands(
 
 
 def select_recordings(recordings: Sequence[Any]) -> tuple[Sequence[Any], int | None]:
-    """Return the packed recordings of a sensor, and the number of draws of each; None: all."""
+    """Return the recordings to pack, and the maximum number of draws of each; None: all."""
     count = len(recordings)
     if count > MAX_RECORDINGS:
         recordings = [recordings[i * count // MAX_RECORDINGS] for i in range(MAX_RECORDINGS)]
@@ -89,7 +89,7 @@ def pack_channels(
     seed: int,
     most: int | None = None,
 ) -> list[Packed]:
-    """Return the channels of a recording (see `list_error_rows`), with ``most`` draws at most."""
+    """Return channels as plain values, with ``most`` draws at most (see `list_error_rows`)."""
     packed = []
 
     def pack_figure(cause: Cause, every: Sequence[AxisErrors]) -> list[Any]:

@@ -53,7 +53,7 @@ _AXIS_COUNT = 3
 
 
 def list_weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
-    """Return the reasons for weak evidence on a limit that has a figure; empty if it is strong.
+    """Return why the evidence on a limit with a known error is weak; empty if it is strong.
 
     They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
     half of the recordings have them.
@@ -91,7 +91,7 @@ def list_weaknesses(standing: Standing, requirement: Requirement, basis: Basis) 
 
 
 def find_longest_time(total: ErrorBudgetRow, requirement: Requirement) -> float:
-    """Return the longest time in a limit, s: its own, or its static window."""
+    """Return the time of a limit or its static window, s, whichever is longer."""
     window = requirement.static_window
     # North-finding has no static window before it.
     before = parse_quantity(window, "time") if window and total.error != "north" else 0.0
@@ -103,7 +103,7 @@ Factors = Mapping[str, float]  # by quantity
 
 @dataclass(frozen=True)
 class Unless:
-    """Alternative verdict on a sensor."""
+    """Alternative verdicts on a sensor: with figures as logged, and with corrected units."""
 
     # the deciding limit with the figures as logged; None if it is the present one
     logged: Standing | None
@@ -117,9 +117,9 @@ def judge_with_corrected_units(
 ) -> Unless | None:
     """Return the verdict on a sensor with doubtful units corrected.
 
-    The rows belong to one requirement. None without a figure, or if the verdict would not
-    change. If all recordings were left out, the verdict from their figures as logged is returned
-    too.
+    The rows belong to one requirement. The result is None if no error is known, or if the verdict
+    would not change. If all recordings were left out, it includes the verdict from their figures
+    as logged.
     """
     keys = list(dict.fromkeys((sensor, row.recording) for row in rows))
     apart = [key for key in keys if key in basis.apart]
@@ -152,7 +152,7 @@ def judge_with_corrected_units(
 
 
 def scale_errors(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
-    """Return the rows of one error of one recording, with quantities multiplied by factors."""
+    """Return the rows of one error of a recording, with noise multiplied by factors."""
     own = [row for row in parts if row.source != "total"]
     sources = []
     for row, sigma in suitability.select_known_errors(own):
@@ -194,12 +194,12 @@ _WORST_FIRST: tuple[Verdict, ...] = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """Judgement of a sensor by a requirement."""
+    """The verdict on a sensor for one requirement, with everything that it depends on."""
 
     name: str  # of the requirement
     requirement: Requirement
     sensor: str
-    standings: Sequence[Standing]  # one a limit
+    standings: Sequence[Standing]  # one for each limit
     decides: Standing  # the limit that decides the verdict
     # reasons for weak evidence, by limit; also empty if nothing is known
     weak: Sequence[Sequence[str]]
@@ -249,9 +249,8 @@ def judge_sensors(
 ) -> Iterator[Judgement]:
     """Yield the judgement of each sensor by each requirement.
 
-    ``errors`` belong to all recordings; ``sensors`` have ``price_class`` and, if known,
-    ``abilities``; ``basis`` has the recordings. Recordings that are not used in comparisons are
-    omitted.
+    ``errors`` are of all recordings; ``basis`` describes them. ``sensors`` have ``price_class``
+    and, if known, ``abilities``. Recordings not used in comparisons are ignored.
     """
     by_requirement: dict[str | None, dict[str, list[ErrorBudgetRow]]] = {}
     for row in errors:

@@ -35,8 +35,6 @@ with one."""
 
 @dataclass(frozen=True)
 class _Step:
-    """One step for one requirement."""
-
     action: Action
     key: tuple[str, str | None]
     requirement: str
@@ -156,10 +154,10 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 
 
 def count_specimens_needed(expected: Expected, away: float) -> int | None:
-    """Return the number of additional specimens that narrows the limits of an error to a distance.
+    """Return how many additional specimens give a verdict; None if 20 in all are not enough.
 
-    ``away`` is the logarithm of the margin, the maximum half width t sqrt(tau^2 (1 + 1/n)) of the
-    prediction interval. The errors of the logs are neglected. None if 20 specimens are not enough.
+    The half width t sqrt(tau^2 (1 + 1/n)) of the prediction interval from n specimens must not
+    exceed ``away``, the absolute logarithm of the margin. The errors of the logs are neglected.
     """
     assert expected.spread is not None
     for number in range(expected.specimens + 1, _MAX_SPECIMENS + 1):
@@ -195,7 +193,6 @@ def _find_strengthening_steps(judgement: Judgement, reason: str, basis: Basis) -
 
 
 def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
-    """Return the longest recording of a standing, and its duration."""
     keys = [(sensor, row.recording) for row in standing.totals]
     key = max(keys, key=lambda candidate: basis.duration(candidate) or 0.0)
     return key, basis.duration(key)

@@ -57,7 +57,7 @@ class Expected:
     # specimens, recordings: their numbers
     specimens: int
     recordings: int
-    # between specimens, or between the recordings of one; None: unknown
+    # spread between specimens, or between the recordings of one specimen; None: unknown
     spread: Spread | None = None
     spread_of: SpreadOf | None = None
 
@@ -65,7 +65,10 @@ class Expected:
 def predict_error(
     totals: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None = None
 ) -> Expected:
-    """Return the predicted error of the next specimen from totals of a limit, one a recording."""
+    """Return the predicted error of the next specimen, from one total per recording.
+
+    ``devices`` has the specimen of each recording; ``usual`` is the spread of other sensors.
+    """
     figures = [
         (row, (row.sigma, row.lower, row.upper))
         for row in totals

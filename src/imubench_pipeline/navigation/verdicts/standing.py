@@ -31,7 +31,7 @@ def get_trajectory(total: ErrorBudgetRow) -> str | None:
 
 @dataclass(frozen=True)
 class Standing:
-    """Error of a sensor and one limit of a requirement."""
+    """The error of a sensor compared with one limit of a requirement."""
 
     # row ``total`` of the representative recording: the one whose error is nearest to the expected
     # error
@@ -46,12 +46,12 @@ class Standing:
 
     @property
     def known(self) -> bool:
-        """Whether there is a figure."""
+        """Whether the error is known."""
         return self.expected.sigma is not None
 
     @property
     def margin(self) -> float:
-        """Limit over error."""
+        """The limit divided by the expected error."""
         return _divide(self.total.limit, self.expected.sigma)
 
     @property
@@ -61,7 +61,7 @@ class Standing:
         return _divide(limit, self.expected.upper), _divide(limit, self.expected.lower)
 
     def scale_margin(self, sigma: float | None) -> float | None:
-        """Return the margin if the total of the representative recording were another."""
+        """Return the margin if the total of the representative recording were ``sigma``."""
         if not self.known or sigma is None or not self.total.sigma:
             return None
         return self.margin * self.total.sigma / sigma if sigma > 0.0 else math.inf
@@ -74,13 +74,13 @@ class Standing:
 
     @property
     def wide(self) -> bool:
-        """Whether the interval of the error is wide."""
+        """Whether the 95 % limits of the error have a ratio above `MAX_LIMIT_RATIO`."""
         low, high = self.margins
         return low <= 0.0 or high / low > MAX_LIMIT_RATIO
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict by the probability to be within the limit."""
+        """Verdict on this limit, by the probability that the error is within it."""
         if not self.known:
             return "not_enough_data"
         if self.chance >= SURE_PROBABILITY:
@@ -102,7 +102,7 @@ def list_standings(
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
 ) -> list[Standing]:
-    """Return the standing of one sensor for each limit; ``usual`` is by `make_limit_key`."""
+    """Return the standing of one sensor for each limit; ``usual``: other sensors' spreads."""
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
         if row.source == "total":
@@ -147,7 +147,7 @@ def list_standings(
 
 
 def make_limit_key(row: ErrorBudgetRow) -> tuple[Any, ...]:
-    """Return the key of the limit of a row."""
+    """Return the error, time, size and trajectory that identify the limit of a row."""
     return row.error, row.time, row.limit, get_trajectory(row)
 
 

@@ -59,11 +59,11 @@ class FindingData:
     affects: ClassVar[frozenset[str]]
     """Parameters whose estimates it puts in doubt; `NONE`: it is no doubt."""
     unfit: ClassVar[bool]
-    """Whether the log may come from several sensors, from motion, or have another unit."""
+    """Whether the log is not used: it may be of several sensors, of motion, or in another unit."""
     scales: ClassVar[Mapping[str, float]]
-    """If its value is a factor that corrects samples or times: the power for each parameter."""
+    """If a factor corrects samples or times: its power in each parameter; else empty."""
     doubt: ClassVar[str]
-    """The doubt in a few words; ``{channels}`` stands for the channels, ``{are}`` for is or are."""
+    """The doubt in a few words; ``{channels}`` becomes the channels, ``{are}`` is or are."""
 
     def __init_subclass__(
         cls,
@@ -101,7 +101,7 @@ def channels_text(channels: Sequence[str]) -> str:
 
 
 Kind = Literal["signal", "level", "density"]
-"""What is shown: samples and their mean, the level of slow noise and bias, or white noise."""
+"""What a unit is for: samples and their mean, the level of slow noise and bias, white noise."""
 
 System = Literal["practical", "si"]
 _system: ContextVar[System] = ContextVar("system", default="practical")
@@ -145,7 +145,7 @@ def value_text(value: float, channel: str, kind: Kind = "signal") -> str:
 
 
 def at_text(seconds: float) -> str:
-    """Return a position in a recording, in s as in ``use:``."""
+    """Return a position in a recording with its unit, s, as in the notes (``use:``)."""
     return f"{number_text(seconds, 5)} s"
 
 

@@ -23,7 +23,7 @@ _MIN_CYCLES = 1.5  # in a log, of a drift that is called periodic
 
 
 def removal_text(factors: Mapping[str, float] | None) -> str:
-    """Return how the most changed parameters would differ without the removal of a signal."""
+    """Return by which ``factors`` parameters would be larger if a signal were not removed."""
     if factors is None:
         return ""
     clear = {name: factor for name, factor in factors.items() if name in _SHOWN}
@@ -53,7 +53,7 @@ class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channel
     time: float  # s from the first sample
     time_error: float  # half width of the 95 % interval of the time, s
     factors: dict[str, float] | None = None
-    """Of the parameters that change without the removal of all signals; None: not known."""
+    """Factor of each parameter if no signal is removed; None: not known."""
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
@@ -77,7 +77,7 @@ class WarmUpDrift(
     time_lower: float
     time_upper: float  # time constant, with 95 % limits, s
     factors: dict[str, float] | None = None
-    """Of the parameters that change without the removal of all signals; None: not known."""
+    """Factor of each parameter if no signal is removed; None: not known."""
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
@@ -99,7 +99,7 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
     time_lower: float
     time_upper: float  # period, with 95 % limits, s
     factors: dict[str, float] | None = None
-    """Of the parameters that change without the removal of all signals; None: not known."""
+    """Factor of each parameter if no signal is removed; None: not known."""
     cycles: float | None = None  # in the log
     has_temperature: bool = False  # whether the log has readings of the temperature
 
@@ -137,7 +137,7 @@ class TelegraphNoise(
 class NoiseTrend(FindingData, code="noise_grows", affects=NONE):
     """The white noise grows or falls steadily."""
 
-    trend: float  # N at the end over N at the start, minus 1
+    trend: float  # N at the end divided by N at the start, minus 1
     error: float  # half width of the 95 % interval of the trend
 
     def text(self, channel: str) -> str:

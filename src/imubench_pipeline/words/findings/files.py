@@ -16,7 +16,7 @@ class Rejected(base.FindingData, affects=base.ALL, doubt="the recording was reje
 
 
 class Failed(base.FindingData, affects=base.ALL, doubt="the analysis failed"):
-    """A recording of which a step failed."""
+    """A recording that is left out, because a step failed."""
 
     reason: str
 
@@ -67,8 +67,8 @@ class Knocks(base.FindingData, affects=base.WHITE, doubt="knocks in {channels}")
     """Short disturbances, which are left out."""
 
     knocks: int
-    sigmas: float  # size of the largest one over the noise
-    times: tuple[float, ...]  # positions of the first ones, s
+    sigmas: float  # size of the largest knock, standard deviations of the noise
+    times: tuple[float, ...]  # positions of the first knocks, s
     samples: int  # samples that are left out
 
     def text(self, channel: str) -> str:
@@ -102,8 +102,8 @@ class SimulatedByMark(
 class UnusedFiles(base.FindingData, affects=base.NONE):
     """Files of a folder from which no channel is read."""
 
-    files: tuple[str, ...]  # the first ones
-    number: int  # number of all
+    files: tuple[str, ...]  # the first of these files
+    number: int  # number of all these files
     folder: str
 
     def text(self, channel: str) -> str:
@@ -159,7 +159,7 @@ class UnitContradicts(
     where: str  # place of the unit in the log
     in_sensor_file: str
     scale: float  # scale in the sensor file
-    factor: float  # unit of the log over the one that is used
+    factor: float  # unit of the log divided by the unit that is used
 
     def text(self, channel: str) -> str:
         scaled = "" if self.scale == 1.0 else f", times {number_text(self.scale)}"
@@ -225,7 +225,7 @@ class LateRecords(base.FindingData, affects=base.NONE):
 
     file: str
     records: int
-    delay: float  # longest one, s
+    delay: float  # longest delay, s
 
     def text(self, channel: str) -> str:
         return (
@@ -240,10 +240,10 @@ class IncompleteLastRecord(base.FindingData, affects=base.NONE):
     file: str
     shown: str | None = None  # its first letters, if it has no line break
     has_checksum: bool = False  # its kind has a checksum, which is wrong
-    columns: int | None = None
-    expected: int | None = None  # number of its columns, and of the columns of a whole record
-    messages: int | None = None
-    message: str = ""  # number of messages that are cut short, and their name
+    columns: int | None = None  # number of its columns
+    expected: int | None = None  # number of columns of a whole record
+    messages: int | None = None  # number of messages that are cut short
+    message: str = ""  # name of these messages
 
     def text(self, channel: str) -> str:
         if self.messages is not None:
@@ -262,7 +262,7 @@ class IncompleteLastRecord(base.FindingData, affects=base.NONE):
 
 
 class IncompleteFirstRecord(base.FindingData, affects=base.NONE):
-    """First lines that are only parts of records, and left out."""
+    """First lines that are only parts of records, and are left out."""
 
     file: str
     lines: int
@@ -294,7 +294,7 @@ class NotRecords(base.FindingData, affects=base.NONE):
 
 
 class RestartedLog(base.FindingData, affects=base.NONE):
-    """Headers within a log."""
+    """Further headers within a log, whose logger was restarted."""
 
     file: str
     restarts: int
@@ -327,7 +327,7 @@ class DamagedMessage(base.FindingData, affects=base.ALL, doubt="messages are dam
 
 
 class DamagedBytes(base.FindingData, affects=base.NONE, doubt="parts of the file are damaged"):
-    """Bytes of a binary log that are no message, and left out."""
+    """Bytes of a binary log that are no message, and are left out."""
 
     file: str
     bytes: int
@@ -381,7 +381,7 @@ class WrongChecksum(base.FindingData, affects=base.ALL, doubt="messages have a w
 
 
 class UncheckedLogs(base.FindingData, affects=base.NONE, doubt="no checksum is right"):
-    """Logs of which no checksum is right at the beginning; they are read unchecked."""
+    """Messages of a file that are read unchecked: at its beginning, no checksum is right."""
 
     file: str
     number: int

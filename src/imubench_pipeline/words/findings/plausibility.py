@@ -20,7 +20,7 @@ class RateImplausible(
     scales=base.POWERS_OF_TIME,
     doubt="the sampling rate looks wrong",
 ):
-    """No such sensor samples at this rate."""
+    """The sampling rate is implausible for an inertial sensor."""
 
     rate: float
     slowest: float
@@ -65,8 +65,8 @@ class ImpossibleNoise(
     """Less noise than physics allows for any sensor of this kind."""
 
     noise: float  # SI
-    least: float  # of known sensors, SI
-    sensors: int  # number of those sensors
+    least: float  # least noise of known sensors, SI
+    sensors: int  # number of known sensors
 
     def text(self, channel: str) -> str:
         return (
@@ -85,15 +85,15 @@ class SuspiciousUnit(
     scales=base.POWERS_OF_UNIT,
     doubt="the unit of measurement of {channels} looks wrong",
 ):
-    """Gravity, or the noise, is usual in another unit than the stated one."""
+    """Gravity or noise is unusual in the stated unit, and would be usual in another unit."""
 
     stated: str
-    likely: str  # units as the sensor file writes them
+    likely: str  # both units as the sensor file writes them
     factor: float  # corrects the samples
     gravity: float | None = None  # norm of the mean acceleration, m/s², if it shows the mistake
     noise: float | None = None  # white noise, SI, if it shows the mistake
     usual: tuple[float, float] | None = None  # usual limits of the white noise, SI
-    printed: bool = False  # whether they are from the datasheet of the sensor, and not of any
+    printed: bool = False  # whether these limits are from the datasheet of this sensor
     mean: float | None = None  # rate of all gyros, rad/s, if it is unusual too
 
     def text(self, channel: str) -> str:
@@ -119,7 +119,7 @@ class SuspiciousUnit(
 
 
 class GravityNorm(base.FindingData, affects=base.ALL, doubt="the mean acceleration is not gravity"):
-    """The mean acceleration is not gravity, in no unit."""
+    """The mean acceleration is not gravity in any unit."""
 
     norm: float  # m/s²
     removed: bool  # whether gravity seems to be subtracted
@@ -141,7 +141,7 @@ class NoiseUnlikeDatasheet(
 ):
     """The white noise is far from the printed one, and no unit explains it."""
 
-    measured_on: str  # the channel, also where the finding is about all
+    measured_on: str  # the channel, even if the finding is about all channels
     noise: float
     printed: float  # white noise, SI
     stated_rate: float | None  # Hz, if the log has no time stamps: it may be the cause
@@ -163,7 +163,7 @@ class AxisUnlike(
     """One axis has much more or much less noise than both others."""
 
     others: tuple[str, ...]
-    ratio: float  # white noise over the white noise of the others
+    ratio: float  # white noise divided by the white noise of the others
     noise: float  # white noise, SI
     stated: str
     likely: str | None  # units as the sensor file writes them; None: no unit explains it
@@ -245,15 +245,15 @@ class UnusualFigure(
     affects=_OF_UNIT | {"S"},
     doubt="N or B of {channels} differs from all known sensors",
 ):
-    """N or B is twenty times off the figures of other sensors."""
+    """N or B is far above the median, or far below the least, of other sensors."""
 
     quantity: str
     figure: str  # ``N`` or ``B``
     value: float
     usual: float  # median of other sensors, or the least if the value is below it, SI
-    sensors: int  # number of those sensors
+    sensors: int  # number of other sensors
     factor: float | None
-    """Of a unit mistake that explains it (`UNIT_MISTAKES`); None: there is none."""
+    """Factor of the unit mistake that explains it (`UNIT_MISTAKES`); None: no mistake does."""
     lower: float | None = None
     upper: float | None = None
     """Limits of an estimate; its B is the minimum of the Allan deviation, as vendors print it."""

@@ -27,7 +27,7 @@ class Quantised(FindingData, affects=NONE):
     """The values are multiples of a visible step."""
 
     step: float
-    step_over_noise: float | None = None  # none: the noise is not known, as most samples are equal
+    step_over_noise: float | None = None  # None: the noise is unknown, as most samples are equal
     lowest: float | None = None
     highest: float | None = None
     is_rounded: bool = False
@@ -63,7 +63,7 @@ class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
 
     levels: float
     step: float
-    step_over_noise: float | None  # none: most samples are equal
+    step_over_noise: float | None  # None: the noise is unknown, as most samples are equal
     is_rounded: bool
 
     def text(self, channel: str) -> str:
@@ -78,7 +78,7 @@ class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
 
 
 class Interpolated(FindingData, affects=NONE):
-    """Samples on straight lines between their neighbours, which are left out."""
+    """Samples that lie on straight lines between neighbours, and are left out."""
 
     samples: int
     share: float
@@ -123,7 +123,7 @@ class HeldSamples(FindingData, affects=WHITE, doubt="repeated samples in {channe
 
 
 class NoSamples(FindingData, affects=ALL, doubt="no samples in {channels}"):
-    """A channel without a number."""
+    """A channel that has no number at all."""
 
     def text(self, channel: str) -> str:
         return f"{channel_name(channel)} contains no number"
@@ -165,7 +165,7 @@ class Stuck(FindingData, affects=ALL, unfit=True, doubt="{channels} did not chan
 
 
 class EmptyCells(FindingData, affects=ALL, doubt="missing samples in {channels}"):
-    """Records without a number."""
+    """Records in which the channel has no number."""
 
     cells: int
     longest: int  # records of the longest run
@@ -265,7 +265,7 @@ class Step(FindingData, affects=SLOW | {"bias"}, doubt="a step in {channels}"):
 
     size: float
     at: float
-    sigmas: float  # size over the standard deviation of all changes of the mean
+    sigmas: float  # size divided by the standard deviation of all changes of the mean
 
     def text(self, channel: str) -> str:
         return (
@@ -276,11 +276,11 @@ class Step(FindingData, affects=SLOW | {"bias"}, doubt="a step in {channels}"):
 
 
 class WarmUp(FindingData, affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"):
-    """The beginning drifts."""
+    """The channel drifts at the beginning of the log."""
 
     drift: float
     end: float
-    ratio: float | None  # drift over the usual one in the rest; None if there is none
+    ratio: float | None  # drift divided by the usual drift later in the log; None: no drift later
 
     def text(self, channel: str) -> str:
         later = "; later it does not drift"
@@ -294,7 +294,7 @@ class WarmUp(FindingData, affects=SLOW | {"bias"}, doubt="warm-up drift of {chan
 
 
 class NotStationary(FindingData, affects=ALL, doubt="the noise of {channels} changes"):
-    """The noise of one part is larger than elsewhere."""
+    """The noise is larger in one part of the log than elsewhere."""
 
     ratio: float
     start: float
@@ -313,7 +313,7 @@ class Joined(FindingData, affects=ALL, unfit=True, doubt="two logs are joined"):
 
     changes: tuple[Change, ...]
     at: float
-    noise_ratio: float  # noise after the change over the noise before
+    noise_ratio: float  # noise after the change divided by the noise before
 
     def text(self, channel: str) -> str:
         changed = join_names([_CHANGES[change] for change in self.changes])
@@ -328,10 +328,10 @@ class Joined(FindingData, affects=ALL, unfit=True, doubt="two logs are joined"):
 class Interleaved(
     FindingData, affects=ALL, unfit=True, doubt="samples of two sensors are interleaved"
 ):
-    """Every other sample is of another sensor."""
+    """Every other sample is from another sensor."""
 
     changes: tuple[Change, ...]
-    level: float  # difference of the levels over the standard deviation of the noise
+    level: float  # difference of the levels divided by the standard deviation of the noise
     noise_ratio: float
 
     def text(self, channel: str) -> str:
@@ -351,7 +351,7 @@ class ChannelTwice(
     """A channel has the samples of another one."""
 
     original: str
-    factor: float  # factor from the other channel, SI
+    factor: float  # samples of this channel divided by samples of the other one, SI
 
     def text(self, channel: str) -> str:
         scaled = ""

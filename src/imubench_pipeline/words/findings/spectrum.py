@@ -8,7 +8,7 @@ class MethodsDiffer(FindingData, affects=NONE):
     """Robust fit and likelihood give a parameter with intervals that exclude each other."""
 
     parameter: str
-    ratio: float  # value of the likelihood over value of the robust fit
+    ratio: float  # value of the likelihood divided by the value of the robust fit
 
     def text(self, channel: str) -> str:
         return (
@@ -25,7 +25,7 @@ class Lines(FindingData, affects=NONE):
     sinusoids: int
     bands: int  # number of narrow bands of noise
     frequency: float  # frequency of the strongest, Hz
-    ratio: float  # density of the strongest over the noise floor
+    ratio: float  # density of the strongest divided by the noise floor
 
     def text(self, channel: str) -> str:
         kinds = [
@@ -66,12 +66,12 @@ class StrongLine(
 class TooManyLines(
     FindingData, affects=frozenset({"S"}), doubt="too many spectral lines in {channels}"
 ):
-    """More sinusoids than a noise model has."""
+    """More sinusoids than a noise model can have."""
 
     lines: int
     single: int  # number of lines that are used individually
-    share: float  # power of the others over the power of all lines
-    rms: float  # of the others, SI
+    share: float  # power of the other lines divided by the power of all lines
+    rms: float  # root mean square of the other lines, SI
 
     def text(self, channel: str) -> str:
         return (
@@ -132,12 +132,12 @@ class SlowNoiseMissing(
 class BacktestContradicts(
     FindingData, affects=SLOW, doubt="more drift of {channels} than its noise model predicts"
 ):
-    """The errors over windows of the log are larger than predicted."""
+    """In windows of the log, errors of dead reckoning are larger than predicted."""
 
     error: str  # ``attitude``, ``heading``, ``velocity`` or ``position``
     time: float  # of dead reckoning, s
-    window: float | None  # at rest before it, over which the bias is estimated, s
-    ratio: float  # measured over predicted error
+    window: float | None  # time at rest before, from which the bias is estimated, s
+    ratio: float  # measured error divided by predicted error
     ratio_lower: float | None
     ratio_upper: float | None  # limits of the ratio in 95 % of logs, if the model is right
     windows: int | None

@@ -14,7 +14,7 @@ def _rate_text(rate: float) -> str:
 
 
 class RateChanges(base.FindingData, affects=base.WHITE, doubt="the sampling rate changes"):
-    """A part of a log has every n-th sample only."""
+    """A part of a log has only every n-th sample."""
 
     share: float  # share of the samples in that part
     start: float
@@ -35,7 +35,7 @@ class RateChanges(base.FindingData, affects=base.WHITE, doubt="the sampling rate
 
 
 class CoarseStamps(base.FindingData, affects=_TIMED, doubt="the sampling rate is ambiguous"):
-    """Stamps with double or zero steps at regular distances."""
+    """Time stamps with steps of zero or of two intervals at regular distances."""
 
     rate: float
     other_rate: float  # rate if the stamps are not rounded, Hz
@@ -62,8 +62,8 @@ class MissingSamples(base.FindingData, affects=base.ALL, doubt="samples are miss
     longest: float  # duration of the longest gap, s
     start: float  # its start, s
     rate_of_bursts: float | None = None
-    """Rate if no sample is missing, Hz; where most samples are missing."""
-    noise_ratio: float | None = None  # N at that rate over N
+    """Rate if no sample is missing, Hz; None unless most samples are missing."""
+    noise_ratio: float | None = None  # N at that rate divided by N
 
     def text(self, channel: str) -> str:
         longest = f"{number_text(self.longest, 3)} s, from {at_text(self.start)} on"
@@ -158,7 +158,7 @@ class RateDrifts(base.FindingData, affects=_TIMED, doubt="the clock drifts"):
 
 
 class JitteredStamps(base.FindingData, affects=_TIMED, doubt="the time stamps are irregular"):
-    """Stamps on no uniform grid, so that lost samples are not seen."""
+    """Time stamps that lie on no uniform grid, so that lost samples cannot be detected."""
 
     share: float  # share of the stamps off the grid
     pauses: int

@@ -27,7 +27,7 @@ def changes_between_parts(excess: float) -> str:
 
 
 def few_points(points: int, longest: float, needed: int) -> str:
-    """Return why a curve is too short; ``longest``: longest tau over the length of the log."""
+    """Return why a curve is too short; ``longest``: longest tau divided by the log's length."""
     return (
         f"the curve has {points} of the {needed} points that are needed up to "
         f"{percent_text(longest)} of the log. Record a longer log"
@@ -50,7 +50,7 @@ def no_rise(tau: float, sigmas: float) -> str:
 
 
 def no_walk_slope(steepest: float | None) -> str:
-    """Return why K is not read; ``steepest``: slope of the steepest end, None if it has none."""
+    """Return why K is not read; ``steepest``: slope at the end, None if the minimum is there."""
     text = "the curve does not end with the slope +1/2 of a random walk: its "
     if steepest is None:
         return f"{text}lowest point is near its end"

@@ -51,7 +51,7 @@ def density_of_rms(bandwidth: str | None = None, low_pass: str | None = None) ->
 
 
 def curve_plateau(floor: float) -> str:
-    """Return its second interpretation; ``floor``: Allan deviation of flicker noise over B."""
+    """Return that a plateau is compared; ``floor``: Allan deviation of flicker noise / B."""
     return f"compared with the plateau of the bias instability, {number_text(floor, 3)} B"
 
 
@@ -79,7 +79,7 @@ def mean_is_not_gravity(norm: float) -> str:
 
 
 def slope_at(reference: float, lowest: float | None, highest: float | None, *, bends: bool) -> str:
-    """Return where a temperature sensitivity is measured, °C; ``bends``: with temperature."""
+    """Return the temperatures of a sensitivity, °C; ``bends``: it changes with temperature."""
     text = f"slope at {number_text(reference, 3)} °C"
     if lowest is not None and highest is not None:
         text += (

@@ -34,7 +34,7 @@ def correlation_bound(bound: float, *, longest: bool) -> str:
 
 
 def wide_interval(ratio: float) -> str:
-    """Return why no value is given; ``ratio``: upper over lower limit."""
+    """Return why no value is given; ``ratio``: upper limit / lower limit."""
     return (
         f"the upper 95 % limit is {number_text(ratio, 2)} times the lower one: only the interval "
         "is given"
@@ -42,7 +42,7 @@ def wide_interval(ratio: float) -> str:
 
 
 def wide_limits(ratio: float) -> str:
-    """Return why a value is doubtful; ``ratio``: upper over lower limit."""
+    """Return why a value is doubtful; ``ratio``: upper limit / lower limit."""
     return (
         f"the upper 95 % limit is {number_text(ratio, 2)} times the lower one. "
         "Record a longer log to narrow them"
@@ -90,7 +90,7 @@ def lag_range(lower: float, upper: float) -> str:
 
 
 def temperature_like_ramp(share: float) -> str:
-    """Return why temperature is not separable from time; ``share`` of the information."""
+    """Return why temperature is not separable from time; ``share``: explained by time alone."""
     return (
         f"the temperature is close to a ramp: time alone explains {percent_text(share, 2)} of the "
         "information on the sensitivity. Vary the temperature up and down"

@@ -57,7 +57,7 @@ def status_reason(status: Status, reason: str | None) -> str:
 
 
 def first_value(terms: str) -> str:
-    """Return why a first value is not tested; ``terms``: of bias instability, may be empty."""
+    """Return why a first value is not tested; ``terms`` of bias instability in its model, or ''."""
     return f"the first value with {terms}" if terms else "the first value"
 
 
@@ -101,7 +101,7 @@ def short_for_windows(windows: int, span: float, needed: float, longest: float) 
 
 
 def gaps_between_windows(count: int, windows: int, span: float, needed: float) -> str:
-    """Return why a log with gaps is not tested; ``count``: of overlapping windows, times in s."""
+    """Return why a log with gaps is not tested; ``count``: overlapping windows; times in s."""
     return (
         f"gaps leave {counted(count, 'overlapping window')}: "
         f"{_windows_text(windows, span, needed)} without a gap"

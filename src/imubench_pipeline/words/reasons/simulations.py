@@ -20,7 +20,7 @@ IN_NO_TABLE = "it is in no table of its sensor"
 
 
 def of_data_sheet(name: str, document: str | None) -> str:
-    """Return the source of a model; ``document``: of the datasheet, if it is named."""
+    """Return the source of a model; ``document``: title of the datasheet, or None."""
     return f"the datasheet of {name}" + (f": {document}" if document else "")
 
 

@@ -34,7 +34,7 @@ def cutoff_range(lower: float, upper: float) -> str:
 
 
 def unknown_filter(number: int) -> str:
-    """Return why a bend is no known filter; ``number``: of the filters that were tried."""
+    """Return why a bend is no known filter; ``number``: how many filters were tried."""
     return f"the spectrum bends, but like none of the {number} filters that were tried"
 
 
@@ -61,8 +61,8 @@ def few_bins_left(bins: int, needed: int, highest: float, hidden: int) -> str:
 def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
     """Return the part of N_sensor that bypasses a filter.
 
-    ``share``: power of the noise that bypasses the filter over the filtered power; ``factor``: of
-    N_sensor.
+    ``share``: power of the noise that bypasses the filter, divided by the filtered power;
+    ``factor``: largest N_sensor divided by the estimate.
     """
     return (
         f"white noise with {percent_text(share, 2)} of the filtered power bypasses the {low_pass}, "
