@@ -15,8 +15,8 @@ include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortl
 include: "workflow/rules/report.smk"  # what is read: pages
 
 
-# What is missing or not as it was left is asked for by name: Snakemake takes away what a failed step
-# left, and else makes a file again only for a step that is run again itself.
+# Missing and changed outputs are requested by name: Snakemake removes the outputs of a failed step,
+# and otherwise makes a file again only if its own step is run again.
 rule all:
     input:
         rules.report.output,
@@ -37,7 +37,7 @@ onstart:
     plan.remove_unused_csv()
 
 
-# Tables are read at the end of a run alone: a run should begin at once.
+# Tables are read only at the end of a run: a run should begin at once.
 onsuccess:
     from imubench_pipeline.report.run_summary import (
         SUMMARISED_TABLES,

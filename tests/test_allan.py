@@ -199,8 +199,8 @@ def test_only_taus_with_a_difference_are_returned() -> None:
     [
         ({"samples": []}, "2 or more"),
         ({"samples": [[1.0, 2.0]]}, "one dimension"),
-        ({"rate": 0.0}, "frequency above zero"),
-        ({"cluster_sizes": [0]}, "whole numbers from 1"),
+        ({"rate": 0.0}, "frequency above 0"),
+        ({"cluster_sizes": [0]}, "whole numbers of 1 or more"),
         ({"overlap": "none"}, "expected 'full'"),
         ({"valid": [True]}, "shape"),
         ({"segments": [(0, 50), (40, 100)]}, "segment"),
@@ -214,9 +214,9 @@ def test_wrong_arguments(arguments: dict, message: str) -> None:
 
 
 def test_blocks_must_be_as_long_as_stated() -> None:
-    with pytest.raises(ValueError, match="more than"):
+    with pytest.raises(ValueError, match="more samples than"):
         integrate([np.zeros(5)], 4, holes=False)
-    with pytest.raises(ValueError, match="hold 5 samples"):
+    with pytest.raises(ValueError, match="have 5 samples"):
         integrate([np.zeros(5)], 6, holes=False)
     with pytest.raises(ValueError, match="missing or infinite"):
         integrate([np.array([0.0, np.nan, 1.0])], 3, holes=False)

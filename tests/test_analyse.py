@@ -85,7 +85,7 @@ def test_logs_of_one_name_have_that_of_their_folder(tmp_path: Path) -> None:
 
 def test_a_log_that_stands_twice_is_an_error(tmp_path: Path) -> None:
     one = log(tmp_path / "run.csv")
-    with pytest.raises(ConfigError, match="expected each log once"):
+    with pytest.raises(ConfigError, match="give each log once"):
         laid_out(tmp_path, one, one)
 
 
@@ -113,7 +113,7 @@ def test_a_sensor_file_beside_a_log_of_its_name_is_no_notes(tmp_path: Path) -> N
     ("arguments", "words"),
     [
         (["missing.csv"], "missing.csv: no such file"),
-        (["run.csv", "--sensor", "s.yaml", "--rate", "1 Hz"], "state them in the sensor file"),
+        (["run.csv", "--sensor", "s.yaml", "--rate", "1 Hz"], "into the sensor file"),
         (["s.yaml"], "s.yaml"),
     ],
 )

@@ -82,7 +82,7 @@ def test_inspect_writes_a_sensor_file_that_schema_and_check_take(
     main(["schema", "sensor", "--output", str(tmp_path / "schema.json")])
     jsonschema.validate(yaml.safe_load(written), json.loads((tmp_path / "schema.json").read_text()))
     assert main(["inspect", log, "--output", str(output)]) == 2
-    assert "mine.yaml: exists already" in capsys.readouterr().err
+    assert "mine.yaml exists already" in capsys.readouterr().err
     assert output.read_text() == written and [*output.parent.iterdir()] == [output]
 
 

@@ -35,7 +35,7 @@ def test_a_figure_is_converted(
         (["0.1 deg/s", "--to=ug"], "no unit of"),
         (["many", "--to=ug"], "is not a number with its unit"),
         (["1 deg/h", "--to=deg/s", "--one-sided"], "is no density"),
-        (["1 s", "--to=deg/s/sqrt(Hz)", "--rate=9 Hz"], "expected such as deg/s or mg"),
+        (["1 s", "--to=deg/s/sqrt(Hz)", "--rate=9 Hz"], "expected one such as deg/s or mg"),
         (["1 LSB", "--to=deg/s", "--sensitivity=3 LSB"], "expected a figure in LSB"),
     ],
 )

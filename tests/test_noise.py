@@ -129,7 +129,7 @@ def test_ramp_and_quantization_in_closed_form() -> None:
 
 @pytest.mark.parametrize("tau", [0.004, 0.0, [1.0, 0.004]])
 def test_a_cluster_without_a_sample_has_no_variance(tau: float | list[float]) -> None:
-    with pytest.raises(ValueError, match="holds no sample at 100 Hz"):
+    with pytest.raises(ValueError, match="has no sample at 100 Hz"):
         NoiseModel(N=1.0).allan_variance(tau, 100.0)
     assert NoiseModel(N=1.0).allan_variance(0.006, 100.0) == pytest.approx(100.0)
 

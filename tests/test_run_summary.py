@@ -116,7 +116,7 @@ def test_nothing_is_said_without_tables(tmp_path: Path) -> None:
 def test_tables_of_another_form_make_no_run_fail(tmp_path: Path) -> None:
     said(tmp_path, recordings=[recording("a")])
     write("recordings", [recording("a")], tmp_path / "tables/ranking.parquet")
-    expected = f"no summary: {tmp_path / 'tables/ranking.parquet'}: was made by another version"
+    expected = f"no summary: {tmp_path / 'tables/ranking.parquet'} was made by another version"
     assert summarise_run(tmp_path).startswith(expected)
 
 

@@ -85,7 +85,7 @@ def test_parts_without_rows_and_lost_or_damaged_parts_do_not_stay(folder: Path) 
     data = bytearray(part.read_bytes())
     data[len(data) // 2] ^= 1
     part.write_bytes(data)
-    with pytest.raises(TableError, match=r"x\.2026-01\.parquet: is damaged"):
+    with pytest.raises(TableError, match=r"x\.2026-01\.parquet is damaged"):
         read("findings", [folder])
     write([row for row in FINDINGS if row.sensor == "x"], folder)
     assert read("findings", [folder]).equals(table)

@@ -82,7 +82,7 @@ def test_no_file_holds_a_number_that_is_not_finite(
         write_arrow(wrong, path)
     assert not path.exists()
     pq.write_table(wrong, path)
-    with pytest.raises(TableError, match=f"{fault}: remove the file"):
+    with pytest.raises(TableError, match=f"{fault}; remove the file"):
         read("allan", [path])
 
 
@@ -140,7 +140,7 @@ def test_joining_refuses_another_table(tmp_path: Path) -> None:
     write("scores", [SCORE], tmp_path / "a.parquet")
     assert read("scores", [tmp_path / "a.parquet"] * 3).num_rows == 3
     with pytest.raises(
-        TableError, match=r"a\.parquet: was made by another version .* it has no tau"
+        TableError, match=r"a\.parquet was made by another version .* it has no tau"
     ):
         read("allan", [tmp_path / "a.parquet"])
 
@@ -172,13 +172,13 @@ def test_sealed_json_deeper_than_python_reads_is_refused(tmp_path: Path) -> None
     text = '{\n "a": ' + "[" * 100_000 + "]" * 100_000
     digest = hashlib.sha256(f"{text}\n}}".encode()).hexdigest()
     (tmp_path / "a.json").write_text(f'{text},\n "digest": "{digest}"\n}}\n')
-    with pytest.raises(ValueError, match="is nested deeper than permitted"):
+    with pytest.raises(ValueError, match="is nested too deeply"):
         read_sealed_json(tmp_path / "a.json")
 
 
 def test_a_pipe_for_a_file_is_damaged(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.parquet")
-    with pytest.raises(TableError, match=r"a.parquet: is damaged \(it is no file\)"):
+    with pytest.raises(TableError, match=r"a.parquet is damaged \(it is not a regular file\)"):
         read("parameters", [tmp_path / "a.parquet"])
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(ValueError, match="digest"):

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 FOLDER = Path(__file__).with_name("extensions")
-"""The extensions; without this folder there are none."""
+"""Folder of the extensions; without it there are none."""
 
 T = TypeVar("T")
 
@@ -27,11 +27,11 @@ recording."""
 
 @dataclass(frozen=True)
 class Block:
-    """A block of settings: its location, and a reference to the class of its model."""
+    """A block of settings that an extension adds to one kind of file."""
 
     place: Place
-    key: str
-    model: str
+    key: str  # of the block in the file
+    model: str  # reference to its pydantic class
     description: str = ""
 
 
@@ -42,23 +42,23 @@ class Extension:
     name: str
     needs: tuple[str, ...] = ()  # other extensions, without which it is not used
     tables: str | None = None  # the module with the classes of its rows
-    blocks: tuple[Block, ...] = ()  # of settings
+    blocks: tuple[Block, ...] = ()  # blocks of settings
     rules: str | None = None  # file of its rules for Snakemake
-    motions: Mapping[str, str] = field(default_factory=dict)  # simulated ones, by their block
-    simulations: Mapping[str, str] = field(default_factory=dict)  # of sensors, by their block
-    formats: Mapping[str, str] = field(default_factory=dict)  # of log files, by `reader`
+    motions: Mapping[str, str] = field(default_factory=dict)  # simulated motions, by block
+    simulations: Mapping[str, str] = field(default_factory=dict)  # simulated sensors, by block
+    formats: Mapping[str, str] = field(default_factory=dict)  # formats of log files, by `reader`
     limits: Mapping[str, str] = field(default_factory=dict)  # errors to judge, by their table
-    sensor_tables: Mapping[str, str] = field(default_factory=dict)  # of a sensor, by name
+    sensor_tables: Mapping[str, str] = field(default_factory=dict)  # tables of one sensor, by name
     drawings: tuple[str, ...] = ()  # figures of all sensors for print
-    theory_figure: str | None = None  # of the page of theory
-    commands: Mapping[str, str] = field(default_factory=dict)  # of `imubench`, by name
+    theory_figure: str | None = None  # figure for the page of theory
+    commands: Mapping[str, str] = field(default_factory=dict)  # commands of `imubench`, by name
     library: Mapping[str, str] = field(default_factory=dict)  # functions of the library, by name
-    sensor_commands: tuple[str, ...] = ()  # on the page of a sensor
+    sensor_commands: tuple[str, ...] = ()  # commands shown on the page of a sensor
     listings: tuple[str, ...] = ()  # further tables of `imubench formats`
-    pages: tuple[str, ...] = ()  # that a report has once
+    pages: tuple[str, ...] = ()  # pages that a report has once
     recording_pages: Mapping[str, str] = field(default_factory=dict)  # by kind of recording
-    sections: tuple[str, ...] = ()  # of pages that a report has once
-    recording_sections: tuple[str, ...] = ()  # of the page of a static recording
+    sections: tuple[str, ...] = ()  # sections of pages that a report has once
+    recording_sections: tuple[str, ...] = ()  # sections of the page of a static recording
     search: tuple[str, ...] = ()  # names that the search of the report finds
     templates: str | None = None  # folder
     static: str | None = None  # folder with scripts of the pages
@@ -66,7 +66,7 @@ class Extension:
 
 @cache
 def installed_extensions() -> tuple[Extension, ...]:
-    """Return the installed extensions, in alphabetical order."""
+    """Return the installed extensions whose needs are installed too, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.ispkg)
     found: list[Extension] = [
         import_module(f"{__package__}.extensions.{name}").EXTENSION for name in names
@@ -79,7 +79,7 @@ File = Literal["rules", "templates", "static"]
 
 
 def files_of(what: File) -> list[Path]:
-    """Return the files, or folders, of one kind of all extensions."""
+    """Return the path of one kind of file or folder, in each extension that has it."""
     stated = ((one.name, getattr(one, what)) for one in installed_extensions())
     return [FOLDER / name / file for name, file in stated if file is not None]
 
@@ -87,11 +87,8 @@ def files_of(what: File) -> list[Path]:
 class Hook(Generic[T]):
     """A hook of the core, to which extensions add objects of one type.
 
-    Parameters
-    ----------
-    name : str
-        The field of `Extension`. The digest of the code of a step follows the references of the
-        hooks that its modules declare: `sources`.
+    ``name`` is a field of `Extension`. A digest of the code of a step includes the modules to which
+    the references in this field lead (`sources`).
     """
 
     def __init__(self, name: str) -> None:
@@ -102,12 +99,12 @@ class Hook(Generic[T]):
         return list(self.by_key().values())
 
     def by_key(self) -> dict[str, T]:
-        """Return the objects of all extensions by their keys, or by their references."""
+        """Return the objects of all extensions by key; the default key is the reference."""
         return {key: load(reference) for key, reference in references(self._name).items()}
 
 
 def references(hook: str) -> dict[str, str]:
-    """Return the references of all extensions for a hook, by their keys."""
+    """Return the references of all extensions for a hook by key, by default the reference."""
     found: dict[str, str] = {}
     for extension in installed_extensions():
         stated = getattr(extension, hook)
@@ -119,35 +116,34 @@ def references(hook: str) -> dict[str, str]:
 
 
 def blocks(place: Place) -> dict[str, Block]:
-    """Return the blocks of settings of all extensions in files of one kind, by their keys."""
+    """Return the blocks of settings that extensions add to one kind of file, by key."""
     every = (block for extension in installed_extensions() for block in extension.blocks)
     return {block.key: block for block in every if block.place == place}
 
 
 def load(reference: str) -> Any:
-    """Return the object of a reference, or the module if it names no object."""
+    """Import the object that a reference names, or its module if it names no object."""
     module, _, name = reference.partition(":")
     loaded = import_module(f"{__package__}.extensions.{module}")
     return getattr(loaded, name) if name else loaded
 
 
 def find_function(name: str) -> Any:
-    """Return the function of the library that an extension adds; ImportError without it."""
+    """Return a library function that an extension adds; raise ImportError if none adds it."""
     added = references("library")
     if name not in added:
-        raise ImportError(f"{__package__}: no extension has {name}; expected all of extensions/")
+        raise ImportError(
+            f"{__package__}.{name} belongs to an extension that is not installed; reinstall the "
+            "package with all folders of extensions/"
+        )
     return load(added[name])
 
 
 def sources(of: str, name: str) -> list[Path]:
     """Return the files of extensions that a module loads through the registry.
 
-    Parameters
-    ----------
-    of : str
-        How it asks: ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``.
-    name : str
-        With which name.
+    ``of`` is the call in the module, ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``;
+    ``name`` is the argument of this call.
     """
     used = installed_extensions()
     if of == "files_of":

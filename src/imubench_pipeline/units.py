@@ -100,7 +100,7 @@ class UnitError(ValueError):
 
 @contextmanager
 def add_key_to_errors(key: str) -> Iterator[None]:
-    """Put a key in front of the text of a UnitError."""
+    """Put a key in front of the message of a `UnitError` that the block raises."""
     try:
         yield
     except UnitError as error:
@@ -186,18 +186,18 @@ def _parsed(unit: str) -> "tuple[float, pint.Unit]":
             "reference"
         )
     if _LOST_SIGN.search(unit):
-        raise UnitError(f"{unit!r} shows that a sign was lost; state the intended unit")
+        raise UnitError(f"{unit!r} has lost a sign, such as √ or µ; state the intended unit")
     if len(unit) > _LONGEST:
-        raise UnitError(f"{unit[:_LONGEST]!r}... is longer than a unit")
+        raise UnitError(f"{unit[:_LONGEST]!r}... has over {_LONGEST} characters; a unit is shorter")
     power = _POWER_OF_TWO.search(unit)
     text = _normalise(unit[: power.start()] if power else unit)
     if power and abs(int(power[1])) > _HIGHEST_POWER_OF_TWO:
-        raise UnitError(f"cannot read {unit!r} as a unit: the power is too high")
+        raise UnitError(f"cannot read {unit!r} as a unit: its power of 2 is too high")
     try:
         tokens = list(_tokens(text))
         exponents, place = ([], 1) if tokens == ["1"] else _product(tokens, 0)
         if place < len(tokens):
-            raise UnitError(f"found {tokens[place]!r} too much")
+            raise UnitError(f"unexpected {tokens[place]!r}")
         found = _registry().parse_units("")
         for name, exponent in exponents:
             found = found * _registry().parse_units(name) ** exponent
@@ -223,7 +223,7 @@ def _tokens(text: str) -> Iterator[str]:
     while text[place:].strip():
         found = _TOKEN.match(text, place)
         if not found:
-            raise UnitError(f"found {text[place:].strip()[0]!r}")
+            raise UnitError(f"unexpected {text[place:].strip()[0]!r}")
         yield found[0].strip()
         place = found.end()
 
@@ -248,7 +248,7 @@ def _product(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], in
 def _power(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]:
     """Return a unit or a bracket with its exponent, and the end position."""
     if place >= len(tokens):
-        raise UnitError("something is missing at its end")
+        raise UnitError("a unit is missing at its end")
     token = tokens[place]
     if token == "(":
         exponents, place = _product(tokens, place + 1)
@@ -257,13 +257,13 @@ def _power(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]
     elif token[0].isalpha() or token[0] == "_":
         exponents = [(token, 1.0)]
     else:
-        raise UnitError(f"found {token!r}")
+        raise UnitError(f"unexpected {token!r}")
     place += 1
     if place < len(tokens) and tokens[place] == "**":
         raised, place = _exponent(tokens, place + 1)
         exponents = [(name, exponent * raised) for name, exponent in exponents]
     if any(abs(exponent) > _HIGHEST_POWER for _, exponent in exponents):
-        raise UnitError("a power is too high")
+        raise UnitError(f"a power is above {_HIGHEST_POWER:g}")
     return exponents, place
 
 
@@ -277,7 +277,7 @@ def _exponent(tokens: list[str], place: int) -> tuple[float, int]:
             raise UnitError("a power is divided by 0")
         exponent /= divisor
     if bracket and tokens[place : place + 1] != [")"]:
-        raise UnitError("the text after ^ is not a power")
+        raise UnitError("the text after ^ is not a number")
     return exponent, place + bracket
 
 
@@ -285,7 +285,7 @@ def _number(tokens: list[str], place: int) -> tuple[float, int]:
     sign = tokens[place : place + 1] == ["-"]
     digits = "".join(tokens[place + sign : place + sign + 1])
     if not digits[:1].isdigit():
-        raise UnitError("the text after ^ is not a power")
+        raise UnitError("the text after ^ is not a number")
     return (-1.0 if sign else 1.0) * float(digits), place + sign + 1
 
 
@@ -296,7 +296,7 @@ def _targets() -> "dict[str, pint.Unit]":
 
 @lru_cache(maxsize=1024)
 def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
-    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
+    """Return the factor and offset that convert a unit to SI: ``si = factor * value + offset``.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
     Raises
     ------
     UnitError
-        If the unit is unknown, of another dimension, a level in decibels, or lacks a lost sign.
+        If the unit is unknown, of another dimension, a level in decibels, or has lost a sign.
     """
     if unit.strip() == "?":
         raise UnitError(f"the unit '?' is left to fill in; {_expected(dimension)}")
@@ -329,16 +329,16 @@ def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
         fault = f"{unit!r} is no unit of {_said(dimension)}{but}"
         rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
         if rooted != unit and _parsed(rooted)[1].dimensionality == target.dimensionality:
-            fault += f"; is the sign of a root lost, and {rooted!r} meant?"
+            fault += f"; if the sign of a root was lost, write {rooted!r}"
         raise UnitError(f"{fault}; {_expected(dimension)}")
     zero, one = (_registry().Quantity(value, source).to(target).magnitude for value in (0.0, power))
     return float(one - zero), float(zero)
 
 
 def find_dimension(unit: str, expected: tuple[str, ...]) -> str:
-    """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
+    """Return which of the ``expected`` dimensions, keys of `SI_UNITS`, a unit has.
 
-    Raises a `UnitError` about the first dimension if the unit has none of them.
+    The first is the usual dimension: if the unit has none of them, the `UnitError` is about it.
     """
     for dimension in expected[1:]:
         try:
@@ -380,7 +380,7 @@ def convert(value: Any, unit: str, to: str) -> Any:
     Raises
     ------
     UnitError
-        If a unit is not known, or they are of different dimensions.
+        If a unit is unknown, or the units have different dimensions.
 
     Examples
     --------
@@ -402,23 +402,11 @@ def convert(value: Any, unit: str, to: str) -> Any:
 
 
 def parse_setting(value: float | str, dimension: str, name: str) -> float:
-    """Return a setting above 0 in SI: a number is in SI, a text has its unit.
+    """Return a setting in SI, above 0, from a number in SI or from a text with its unit.
 
-    Parameters
-    ----------
-    value : float or str
-        Such as 100.0 or ``100 Hz``.
-    dimension : str
-        A key of `SI_UNITS`.
-    name : str
-        Name of the setting, for the error.
-
-    Raises
-    ------
-    UnitError
-        If a text is no number with a unit of the dimension.
-    ValueError
-        If it is neither a number nor a text, or not above 0 and finite.
+    ``value`` is, for instance, 100.0 or ``100 Hz``; ``dimension`` is a key of `SI_UNITS`; ``name``
+    is the name of the setting, for errors. Raises a `UnitError` if a text is not a number with a
+    unit of this dimension, and a ValueError if the value is not a finite number above 0.
     """
     if isinstance(value, str):
         with add_key_to_errors(f"{name}: "):
@@ -431,8 +419,8 @@ def parse_setting(value: float | str, dimension: str, name: str) -> float:
     if not 0.0 < number < math.inf:
         example = _WRITTEN.get(dimension, f"1 {SI_UNITS[dimension]}")
         raise ValueError(
-            f"{name} is {value!r}, expected a {_said(dimension)} above 0: a number in "
-            f"{SI_UNITS[dimension]}, or a text with its unit such as {example!r}"
+            f"{name} is {value!r}, expected a value of {_said(dimension)} above 0: a number in "
+            f"{SI_UNITS[dimension]}, or a text with its unit, such as {example!r}"
         )
     return number
 
@@ -443,14 +431,15 @@ _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d
 def parse_quantity(text: str, dimension: str) -> float:
     """Read a number with its unit, such as ``100 Hz``, into SI.
 
-    Raises a `UnitError` without a number or a unit, for another dimension, and beyond a float.
+    Raises a `UnitError` if number or unit is missing, the dimension is another one, or the value
+    is too large for a float.
     """
     number, unit = _number_and_unit(text, dimension)
     return _finite(convert_to_si(number, unit, dimension), text)
 
 
 def parse_difference(text: str, dimension: str) -> float:
-    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `parse_quantity`)."""
+    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 K (see `parse_quantity`)."""
     number, unit = _number_and_unit(text, dimension)
     factor, _ = find_conversion(unit, dimension)
     return _finite(factor * number, text)
@@ -460,7 +449,7 @@ def split_quantity(text: str) -> tuple[float, str]:
     """Return the number and the unit of a quantity of any dimension; raises a `UnitError`."""
     match = _QUANTITY.match(text)
     if not match:
-        raise UnitError(f"{text[:_LONGEST]!r} is not a number with its unit, such as '1 deg/h'")
+        raise UnitError(f"{text[:_LONGEST]!r} is not a number with its unit; write it as '1 deg/h'")
     return float(match[1]), match[2]
 
 

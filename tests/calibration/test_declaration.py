@@ -74,7 +74,7 @@ COLUMN = {"column": 4, "unit": "deg/s"}
         ),
         (
             {"pointing": {"latitude": "45 deg", "channel": "gyro_z"}},
-            "pointing.channel: found 'gyro_z'; the log has gyro_x",
+            "pointing.channel: found 'gyro_z'; expected a gyro of the log: gyro_x",
         ),
         (
             {"pointing": {"heading": "3 deg"}},

@@ -99,7 +99,7 @@ def test_what_cannot_be_told_is_said():
     ones = np.ones((len(blocks), 1))
     for x, says in (
         (np.hstack([ones, 2.0 * ones]), "cannot separate the parameters"),
-        (np.hstack([ones, 0.0 * ones]), "0 throughout"),
+        (np.hstack([ones, 0.0 * ones]), "0 in all blocks"),
     ):
         with pytest.raises(NotObservableError, match=says):
             LeastSquares(blocks, MODELS["N"], x)

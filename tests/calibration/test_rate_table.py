@@ -201,5 +201,5 @@ def test_what_cannot_be_is_refused():
         fit_rate_table(SCHEDULE, blocks, means, MODELS["N"], setting_sigma=-1.0)
     with pytest.raises(ValueError, match="heading of the table's axis"):
         fit_rate_table(SCHEDULE, blocks, means, MODELS["N"], Pointing(latitude=0.4, heading=None))
-    with pytest.raises(ValueError, match="the last dwell ends"):
+    with pytest.raises(ValueError, match="the log has 10 samples, expected"):
         calibrate(np.zeros(10), SCHEDULE, MODELS["N"])

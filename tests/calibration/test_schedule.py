@@ -54,11 +54,11 @@ def test_a_slow_ramp_is_not_steady():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Schedule.from_steps([(0.0, 1.0, 0.1)], 10.0, settling=2.0), "holds no sample"),
-        (lambda: Schedule.from_steps([(0, 2, 0.1), (1, 3, 0.2)], 10.0), "before the last ends"),
-        (lambda: Schedule((Dwell(0, 9, 1),), np.zeros(2), 10.0), "2 table rates for 1"),
+        (lambda: Schedule.from_steps([(0.0, 1.0, 0.1)], 10.0, settling=2.0), "has no sample"),
+        (lambda: Schedule.from_steps([(0, 2, 0.1), (1, 3, 0.2)], 10.0), "expected 20 or later"),
+        (lambda: Schedule((Dwell(0, 9, 1),), np.zeros(2), 10.0), "found 2 table rates, expected 1"),
         (lambda: Schedule((Dwell(0, 9, 1),), np.array([np.nan]), 10.0), "not finite"),
-        (lambda: Schedule((), np.zeros(0), 10.0), "needs a dwell"),
+        (lambda: Schedule((), np.zeros(0), 10.0), "expected at least one"),
         (
             lambda: Schedule.from_column(np.arange(99.0), 10.0, tolerance=0.1, shortest=2.0),
             "nowhere steady",

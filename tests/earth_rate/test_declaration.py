@@ -63,7 +63,9 @@ def test_the_channel_that_was_turned() -> None:
         one.moved_gyro(["gyro_x", "gyro_y"])
     with pytest.raises(ValueError, match="the log has no gyro"):
         one.moved_gyro(["accel_x"])
-    with pytest.raises(ValueError, match="channel: found 'gyro_z'; the log has gyro_x"):
+    with pytest.raises(
+        ValueError, match="channel: found 'gyro_z'; expected a gyro of the log: gyro_x"
+    ):
         TwoPosition.model_validate(GOOD | {"channel": "gyro_z"}).moved_gyro(["gyro_x"])
 
 

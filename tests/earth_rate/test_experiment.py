@@ -86,13 +86,13 @@ def test_means_of_dwells_weigh_the_samples_present():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Dwell(3, 3, 1), "holds no sample"),
+        (lambda: Dwell(3, 3, 1), "has no sample"),
         (lambda: Dwell(0, 3, 0), "expected 1"),
-        (lambda: Experiment((), 1.0, 0.0), "needs a dwell"),
-        (lambda: Experiment((Dwell(0, 3, 1), Dwell(2, 5, -1)), 1.0, 0.0), "before the last ends"),
+        (lambda: Experiment((), 1.0, 0.0), "expected at least one"),
+        (lambda: Experiment((Dwell(0, 3, 1), Dwell(2, 5, -1)), 1.0, 0.0), "expected 3 or later"),
         (lambda: Experiment((Dwell(0, 3, 1),), 0.0, 0.0), "the rate is"),
         (lambda: Experiment((Dwell(0, 3, 1),), 1.0, 1.6), "latitude"),
-        (lambda: Experiment((Dwell(0, 3, 1),), 1.0, 0.0).blocks(0), "empty"),
+        (lambda: Experiment((Dwell(0, 3, 1),), 1.0, 0.0).blocks(0), "at least 1 sample"),
         (
             lambda: block_means([np.ones(4)], Experiment((Dwell(0, 5, 1),), 1.0, 0.0), 2),
             "the log has 4 samples",

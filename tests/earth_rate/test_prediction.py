@@ -167,7 +167,7 @@ def test_what_cannot_be_is_refused():
     outlook = Outlook(WHITE, LATITUDE, 2.0, 32.0)
     with pytest.raises(ValueError, match="expected a number above 0"):
         outlook.turns_needed(28.0, 0.0)
-    with pytest.raises(ValueError, match="do not hold two dwells"):
+    with pytest.raises(ValueError, match="is too short for two dwells"):
         outlook.over_dwell(2.0)
     with pytest.raises(ValueError, match="turn_on_bias"):
         compute_information(design_paper_run(1.0).blocks(9), WHITE, -1.0)

@@ -109,7 +109,10 @@ def test_what_is_published_stands_beside_what_noise_allows(made: tuple[Plan, Pat
             {"published": [{"where": "x", "printed": "1 deg/h", "part": "last 9 min"}]},
             "part is 'last 9 min'; expected one of",
         ),
-        ({"channel": "gyro_y"}, "two_position.channel: found 'gyro_y'; the log has gyro_x"),
+        (
+            {"channel": "gyro_y"},
+            "two_position.channel: found 'gyro_y'; expected a gyro of the log: gyro_x",
+        ),
     ],
 )
 def test_turns_that_cannot_be_simulated_name_file_and_key(

@@ -64,7 +64,7 @@ def test_the_recommended_method_is_taken_unless_another_is_asked_for() -> None:
     both = [*AXES, *rows("gyro_x", estimate("weighted", N=9.0), recommended=False)]
     assert choose(both, "gyro").method == "likelihood"
     assert choose(both, "gyro", method="weighted").axis.model.N == 9.0
-    with pytest.raises(ExportError, match="no estimate of a gyro"):
+    with pytest.raises(ExportError, match="no gyro estimate"):
         choose(AXES, "gyro", method="curve")
 
 

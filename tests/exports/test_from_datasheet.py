@@ -60,9 +60,9 @@ def test_every_program_takes_the_sensors_of_the_catalogue(target: str) -> None:
         (["--datasheet", "nothing", "--target", "kalibr"], "lists all"),
         (["--datasheet", "bmi088", "--target", "nothing"], "there are: "),
         (["--datasheet", "bmi088", "--target", "kalibr", "--bounded"], "needs a log"),
-        (["--target", "kalibr"], "expected the folder of results, or --datasheet"),
+        (["--target", "kalibr"], "add it, or --datasheet NAME"),
         (["no_results", "--target", "kalibr"], "no table recordings"),
-        (["results", "--datasheet", "bmi088", "--target", "kalibr"], "expected the folder"),
+        (["results", "--datasheet", "bmi088", "--target", "kalibr"], "omit one of the two"),
     ],
 )
 def test_a_wrong_request_says_what_is_expected(

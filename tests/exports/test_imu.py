@@ -22,9 +22,9 @@ def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
 
 
 def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
-    with pytest.raises(ExportError, match="needs its reason"):
+    with pytest.raises(ExportError, match="needs a reason"):
         imu(inflation=1.5)
-    with pytest.raises(ExportError, match="needs its reason"):
+    with pytest.raises(ExportError, match="needs a reason"):
         imu(inflation=1.5, because=" ")
     text = write_text("kalibr", imu(inflation=1.5, because="vibration in flight")).replace(
         "\n#  ", ""

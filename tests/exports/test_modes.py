@@ -115,7 +115,7 @@ def number(rate: float) -> str:
 
 
 def test_a_program_without_a_recommendation_needs_a_log() -> None:
-    with pytest.raises(ExportError, match="expected --in-use LOG"):
+    with pytest.raises(ExportError, match="add --in-use LOG"):
         apply_mode(IMU, TARGETS["json"], "in-use")
 
 

@@ -295,7 +295,7 @@ def test_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
         ({"sensor": "other"}, "no sensor 'other'; there are: mti_7"),
         ({"target": "other"}, "there are: kalibr, openvins"),
         ({"axis": "serial 2"}, "there are: serial 1"),
-        ({"inflation": 2.0}, "needs its reason"),
+        ({"inflation": 2.0}, "needs a reason"),
         ({"horizon": 1e6, "mode": "bounded"}, "the curve ends"),
     ],
 )
@@ -334,7 +334,7 @@ def test_the_command_writes_a_file_or_says_why_not(
         assert len(arrays.files) > 0
     capsys.readouterr()
     for wrong, said in (
-        ([*ask, "npz"], "expected --output"),
+        ([*ask, "npz"], "add --output"),
         ([*ask, "kalibr", "--inflate", "2"], "--because"),
         ([*ask, "other"], "there are: kalibr"),
         (["export", str(tmp_path / "none"), *ask[2:], "json"], "none"),

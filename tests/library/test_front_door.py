@@ -63,8 +63,8 @@ def test_channels_are_simulated_each_by_a_stream_of_its_own() -> None:
     ("arguments", "expected"),
     [
         ({"rate": "100 deg/s", "samples": 5}, "rate: 'deg/s' is no unit of frequency"),
-        ({"rate": 0.0, "samples": 5}, "rate is 0.0, expected a frequency above 0"),
-        ({"rate": np.nan, "samples": 5}, "expected a frequency above 0"),
+        ({"rate": 0.0, "samples": 5}, "rate is 0.0, expected a value of frequency above 0"),
+        ({"rate": np.nan, "samples": 5}, "expected a value of frequency above 0"),
         ({"rate": [1], "samples": 5}, r"rate is \[1\]"),
         ({"rate": 10}, "neither is given"),
         ({"rate": 10, "samples": 5, "duration": 1}, "both are given"),

@@ -86,4 +86,4 @@ def test_the_command_says_what_listing_took(
     monkeypatch.setattr("imubench_pipeline.run.analysis.project.INSPECTED_S", 0.001)
     assert main(["inspect", str(path)]) == 2
     said = capsys.readouterr().err
-    assert re.fullmatch(r"log.csv.gz: to list it took more than 0.001 s; expected .*\n", said)
+    assert re.fullmatch(r"log.csv.gz: the inspection took more than 0.001 s; expected .*\n", said)

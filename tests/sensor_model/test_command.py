@@ -254,7 +254,7 @@ def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys)
         assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
     text.unlink()
     assert simulate(*given, "--out", binary) == 2
-    assert "log.yaml: exists already" in capsys.readouterr().err
+    assert "log.yaml exists already" in capsys.readouterr().err
     assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
     assert simulate(*given, "--out", binary, "--force") == 0
     assert b"reader: arrow" in binary.with_suffix(".yaml").read_bytes()

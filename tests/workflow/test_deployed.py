@@ -364,7 +364,7 @@ def test_a_new_folder_says_what_it_holds_and_is_never_written_over(ways: Ways) -
     assert (lab / "config/boards/engers.yaml").is_file() and (lab / "logs").is_dir()
     assert read_settings(Sensor, lab / "config/example_sensor.yaml").log.channels
     again = subprocess.run(ways.imubench("init", lab), capture_output=True, text=True, check=False)
-    assert again.returncode == 2 and "config/config.yaml: exists already" in again.stderr
+    assert again.returncode == 2 and "config/config.yaml exists already" in again.stderr
     none = subprocess.run(
         ways.imubench("run", ways.folder / "hub"), capture_output=True, text=True, check=False
     )

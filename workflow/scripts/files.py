@@ -1,4 +1,4 @@
-"""Say of every file in the drop zone whether it is analysed, rejected, failed or skipped."""
+"""List for every file in the drop zone whether it is analysed, rejected, failed or skipped."""
 
 from pathlib import Path
 

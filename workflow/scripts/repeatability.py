@@ -1,4 +1,4 @@
-"""Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
+"""Compare how the fixed bias of each device changes between turn-ons with its datasheet."""
 
 from pathlib import Path
 

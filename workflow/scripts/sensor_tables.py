@@ -1,4 +1,4 @@
-"""Join the results of the recordings of a sensor into one file a table."""
+"""Join the results of a sensor's recordings: one file for each table."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Judge all sensors of the catalogue for each requirement by their datasheets alone."""
+"""Judge all sensors of the catalogue for each requirement, only by their datasheets."""
 
 from pathlib import Path
 

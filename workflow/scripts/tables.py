@@ -17,6 +17,6 @@ if __name__ == "__main__":
         elif output.suffix == ".parquet" and output.stem in params.parts:
             write_parts(joined[output.stem], output, joined["recordings"])
         else:
-            if output.stem not in params.parts:  # the parts of one that is also CSV stay
+            if output.stem not in params.parts:  # a table in parts may have a CSV file, too
                 remove_parts(output)
             write_arrow(joined[output.stem], output)

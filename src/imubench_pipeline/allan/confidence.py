@@ -30,11 +30,11 @@ _MAX_SADDLEPOINT = 1e8  # largest magnitude of the saddlepoint in the search for
 
 
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
-    """Return the noise type, 2 to -2, from the lag-1 autocorrelation of adjacent cluster means.
+    """Return the noise type, 2 to -2 (see `AllanCurve`), from lag-1 autocorrelation of means.
 
     ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m clusters of n
-    samples; ``present``: cumulative counts of samples there (None: no sample is missing). None if
-    there are fewer than 30 clusters. (W. Riley and C. Greenhall, "Power law noise identification
+    samples; ``present``: cumulative counts of samples there (None: no sample is missing). Returns
+    None for fewer than 30 clusters. (W. Riley and C. Greenhall, "Power law noise identification
     using the lag 1 autocorrelation", EFTF 2004.)
     """
     theta = theta[: _MAX_CLUSTERS + 1]
@@ -74,9 +74,9 @@ def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
     edf = M / (1 + 2 sum_k (1 - k/M) r_k^2), where r_k is the autocorrelation at lag k of the second
-    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``. (C.
-    Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences", PTTI
-    2003, with tables instead of the long sums.)
+    differences of noise of this ``exponent`` (`noise_exponent`) at ``n`` samples per cluster, and M
+    is their number, ``terms``. (C. Greenhall and W. Riley, "Uncertainty of stability variances
+    based on finite differences", PTTI 2003, which has tables instead of the long sums.)
     """
     longest = min(terms - 1, 3 * n)
     if longest < 1:
@@ -133,11 +133,11 @@ def deviation_limits(
 ) -> tuple[Array, Array]:
     """Return the chi-squared limits of an Allan deviation, with equal tails; all have shape (m,).
 
-    ``edf_upper`` are the degrees of freedom of the upper limit at 95 %; by default ``edf``. With
-    few differences an Allan variance is less often far too small than a chi-squared variate with
-    the same variance (`match_lower_tail`). At another confidence they are interpolated: from
-    ``edf`` to ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 %
-    limits is then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
+    The lower limit has ``edf`` degrees of freedom. The upper limit at 95 % has ``edf_upper``, by
+    default ``edf``: with few differences, an Allan variance far below its mean is rarer than for a
+    chi-squared variate of the same variance (`match_lower_tail`). At another confidence, the upper
+    limit has edf + (edf_upper - edf) (z / 1.96)^1.4, with z the normal quantile. The coverage of
+    68 % limits is then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
     """
     tail = (1.0 - confidence) / 2.0
     below = edf
@@ -150,12 +150,15 @@ def deviation_limits(
 
 
 def match_variance(weights: Array) -> float:
-    """Return the degrees of freedom with the relative variance of weights of shape (m,)."""
+    """Return the chi-squared degrees of freedom with the relative variance of sum_i w_i x_i.
+
+    The w_i are ``weights``, shape (m,); the x_i are chi-squared with one degree of freedom.
+    """
     return float(weights.sum() ** 2 / (weights @ weights))
 
 
 def match_lower_tail(weights: Array) -> float:
-    """Return the degrees of freedom with the 2.5 % tail of a sum; weights of shape (m,)."""
+    """Return chi-squared degrees of freedom with the lower 2.5 % tail (see `match_variance`)."""
     if len(weights) == 1:
         return 1.0
     quantile = find_lower_quantile(weights, _LOWER_TAIL)
@@ -167,13 +170,13 @@ def match_lower_tail(weights: Array) -> float:
 
 
 def find_lower_quantile(weights: Array, chance: float) -> float:
-    """Return a quantile below the mean of a weighted sum of chi-squared variates over its mean.
+    """Return a lower quantile of a weighted sum of chi-squared variates, over the sum's mean.
 
-    The relative error of the probability in the saddlepoint approximation is below a tenth, for
-    probabilities below a third. The error of the quantile is below 1 % if more than three weights
-    are significant. The weights w_i >= 0, shape (m,), have any common factor. (R. Lugannani and S.
-    Rice, "Saddle point approximation for the distribution of the sum of independent random
-    variables", Adv. Appl. Probab. 12, 1980.)
+    ``chance`` is the probability below it. The saddlepoint approximation has a relative error of
+    this probability below a tenth, for probabilities below a third. The error of the quantile is
+    below 1 % if more than three weights are significant. A common factor of the weights w_i >= 0,
+    shape (m,), has no effect. (R. Lugannani and S. Rice, "Saddle point approximation for the
+    distribution of the sum of independent random variables", Adv. Appl. Probab. 12, 1980.)
     """
     w = weights / weights.sum()
 

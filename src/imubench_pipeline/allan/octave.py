@@ -60,9 +60,10 @@ def _find_level(sizes: Integers) -> Integers:
 
 
 class OctaveSums:
-    """Sums of squared differences of cluster means of one segment of a log.
+    """Accumulates the squared differences of cluster means of one segment of a log.
 
-    The sizes, shape (m,), equal `round_octave_sizes`; the sums have the same bits for any number
+    `push` takes the ``samples`` of the segment in blocks; after `finish`, `results` has the sums.
+    The sizes, shape (m,), are from `round_octave_sizes`; the sums have the same bits for any number
     of threads. With ``holes`` samples may be missing (NaN). ``theta`` and ``present`` are the phase
     at every `DECIMATION`-th sample, ``first`` is the phase of the first samples.
     """
@@ -121,7 +122,7 @@ class OctaveSums:
         self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
 
     def finish(self) -> None:
-        """Sum the remaining samples."""
+        """Sum the rest; ValueError if a sample is infinite, or missing without ``holes``."""
         sections = -(-len(self._rest) // SECTION_SAMPLES)
         if sections:
             self._sum(self._rest, sections, self._rest[:0], sections)
@@ -132,9 +133,9 @@ class OctaveSums:
                 self.present[self._filled] = self._present_at
         if not np.isfinite(self._at):
             raise ValueError(
-                "a sample is infinite"
+                "a sample is infinite; expected a finite number, or NaN where it is missing"
                 if self._holes
-                else "a sample is missing or infinite, but holes=False"
+                else "a sample is missing or infinite, but holes=False; expected finite numbers"
             )
         self.first = integrate(self._begin, sum(map(len, self._begin)), holes=self._holes)
 
@@ -145,7 +146,7 @@ class OctaveSums:
 
     @property
     def results(self) -> list[NDArray[Any]]:
-        """Sum of squares, sum of mean inverse counts, number of differences, and their maximum."""
+        """Four arrays of shape (m,): the sums by size that `sum_all_sizes` returns."""
         steps = self._sizes[~self._short] // DECIMATION
         long = sum_all_sizes(self.phase, steps, self._threads, stride=DECIMATION, gaps=self._gaps)
         return [

@@ -31,7 +31,7 @@ Span = tuple[int, int]
 
 
 def list_spans(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
-    """Return the segments of a log; by default it is one."""
+    """Return the segments of a log; without any, the whole log is one segment."""
     return tuple(segments) if segments else ((0, samples),)
 
 
@@ -48,7 +48,7 @@ class Gaps:
     missing: NDArray[np.int64]  # (64,): samples in gaps of length 1, 2 to 3, 4 to 7 and so on
 
     def enough(self, sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the least number of samples of a cluster with a valid mean, by size."""
+        """Return the least number of samples that a cluster of each size needs for a valid mean."""
         longest = (1 << np.arange(1, 33)) - 1  # in each octave
         octaves = np.searchsorted(longest, sizes // _MIN_CLUSTER_OVER_SHORT_GAP, side="right")
         short = np.concatenate(([0], np.cumsum(self.missing)))[octaves]
@@ -142,7 +142,7 @@ def integrate(
         values = np.asarray(block, dtype=np.float64)
         stop = reached + len(values)
         if stop > samples:
-            raise ValueError(f"the blocks hold more than the {samples} samples stated")
+            raise ValueError(f"the blocks have more samples than expected, {samples}")
         if level is None and not np.isnan(values).all():
             # A constant cancels in the variance, but 9.81 would cost digits of the sum.
             level = average_finite(values)
@@ -153,10 +153,12 @@ def integrate(
             accumulate_present(values, level or 0.0, theta[reach], present[reach])
         reached = stop
     if reached != samples:
-        raise ValueError(f"the blocks hold {reached} samples, {samples} were stated")
+        raise ValueError(f"the blocks have {reached} samples, expected {samples}")
     if not np.isfinite(theta[-1]):
         raise ValueError(
-            "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
+            "a sample is infinite; expected a finite number, or NaN where it is missing"
+            if holes
+            else "a sample is missing or infinite, but holes=False; expected finite numbers"
         )
     return Phase(theta, present, list_spans(segments, samples))
 
@@ -194,7 +196,7 @@ def average_finite(samples: NDArray[np.floating[Any]]) -> float:
 
 @njit(cache=True, nogil=True)
 def accumulate(values: NDArray[np.floating[Any]], level: float, theta: Array) -> None:
-    """Sum samples less a level, from the first entry on."""
+    """Set ``theta[1:]`` to ``theta[0]`` plus the cumulative sums of samples less a level."""
     total = theta[0]
     for i in range(values.size):
         total += values[i] - level
@@ -205,7 +207,7 @@ def accumulate(values: NDArray[np.floating[Any]], level: float, theta: Array) ->
 def accumulate_present(
     values: NDArray[np.floating[Any]], level: float, theta: Array, present: NDArray[Any]
 ) -> None:
-    """Sum samples less a level and count them, from the first entries on; NaN adds nothing."""
+    """Set cumulative sums (see `accumulate`) and counts of samples; NaN adds to neither."""
     total, number = theta[0], present[0]
     for i in range(values.size):
         if not np.isnan(values[i]):
@@ -362,7 +364,7 @@ def _sum_blocks_present(
 
 @dataclass(frozen=True)
 class Presence:
-    """Cumulative numbers of samples present."""
+    """Cumulative numbers of the samples present in a log, at two resolutions."""
 
     samples: int  # L, the points of the grid
     segments: tuple[Span, ...]  # grid points that begin and end each segment
@@ -372,7 +374,7 @@ class Presence:
     gaps: Gaps
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
-        """Return a mask of valid differences of means of n, and their stride; None: too coarse."""
+        """Return which differences of n-sample means are valid, and their stride; None: unknown."""
         if n >= _STARTS_PER_CLUSTER // 2 * self.stride:
             counts, base = self.coarse, self.stride
         elif len(self.first) - 1 >= min(2 * _MIN_CLUSTERS * n, self.samples):

@@ -25,7 +25,7 @@ def count_threads(threads: int | None) -> int:
 def run_in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
-    """Return the joined rows of ``work(first, end)`` on all pieces; it must release the GIL."""
+    """Return the joined rows of ``work(first, end)`` on all pieces; ``work`` releases the GIL."""
     threads = max(1, min(threads, pieces))
     if threads == 1:
         return work(0, pieces)

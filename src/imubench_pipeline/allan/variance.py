@@ -48,7 +48,7 @@ size, and the actual size."""
 
 @dataclass(frozen=True, repr=False)
 class AllanCurve:
-    """An Allan variance over tau; the arrays have the shape (m,)."""
+    """An Allan variance as a function of tau; the arrays have the shape (m,)."""
 
     tau: Array  # cluster length, s: ``cluster_size / rate``, with the actual cluster size
     cluster_size: NDArray[np.int64]  # n, samples in a cluster
@@ -96,7 +96,7 @@ class AllanCurve:
         return float(self.cluster_size[0] / self.tau[0])
 
     def select(self, points: NDArray[np.bool_]) -> "AllanCurve":
-        """Return the curve at some of its points."""
+        """Return the curve at the points of a mask, shape (m,)."""
         arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
         columns: dict[str, Any] = {name: each[points] for name, each in arrays.items()}
         sources = [s for s, chosen in zip(self.edf_source, points, strict=True) if chosen]
@@ -108,9 +108,11 @@ class AllanCurve:
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
-    """Return log-spaced cluster sizes of a log of L samples, whole and distinct.
+    """Return distinct integer cluster sizes, evenly spaced on a logarithmic scale.
 
-    ``per_decade`` sizes, as far as integers allow; ``longest`` is a share of the log, at most 1/2.
+    ``samples`` is the length of the log; ``per_decade`` is the number of sizes per decade (fewer
+    where integers are sparse); ``longest`` is the largest size as a share of the length, at most
+    1/2.
     """
     largest = int(samples * min(longest, 0.5) * (1 + 1e-12))
     if largest < 1:
@@ -139,15 +141,15 @@ def allan_variance(
     rate : float
         Sampling rate, Hz.
     cluster_sizes : array_like of int, optional
-        n of each tau; by default `cluster_sizes` of the length. Sizes without a difference are left
-        out.
+        Samples per cluster, n, of each tau; by default `cluster_sizes` of the length. Sizes without
+        a difference are left out.
     overlap : {"full", "octave"}
         Use every cluster; or clusters that start 1/48 of their length apart, or closer, which is as
         accurate and many times faster (sizes are then rounded by up to 1 %).
     valid : array_like of bool, shape (L,), optional
         False where the sample is missing.
     segments : sequence of (int, int), optional
-        First and one-past-last sample of each segment; no difference spans two.
+        First and one-past-last sample of each segment; no difference spans two segments.
     threads : int, optional
         By default one for each core. The result has the same bits for any number.
 
@@ -164,13 +166,13 @@ def allan_variance(
     """
     values = np.asarray(samples, dtype=np.float64)
     if values.ndim != 1 or len(values) < 2:
-        raise ValueError(f"samples have shape {values.shape}, expected one dimension of 2 or more")
+        raise ValueError(f"samples have shape {values.shape}, expected one dimension of size >= 2")
     if overlap not in ("full", "octave"):
         raise ValueError(f"overlap {overlap!r} is not known, expected 'full' or 'octave'")
     if valid is not None:
         mask = np.asarray(valid, dtype=bool)
         if mask.shape != values.shape:
-            raise ValueError(f"valid has shape {mask.shape}, expected {values.shape}")
+            raise ValueError(f"valid has shape {mask.shape}, expected {values.shape}, as samples")
         values = np.where(mask, values, np.nan)
     present = np.isfinite(values)
     holes, number, cores = not bool(present.all()), len(values), count_threads(threads)
@@ -192,8 +194,8 @@ def allan_variance(
     if not len(curve.tau) and holes:
         raise ValueError(
             f"{int(present.sum())} of {number} samples are finite numbers, and no two adjacent "
-            f"clusters have {MIN_PRESENT_SHARE:.0%} of those between long gaps; expected a log "
-            "with fewer missing"
+            f"clusters have {MIN_PRESENT_SHARE:.0%} of the usual number of samples; expected a "
+            "log with fewer missing samples"
         )
     return curve
 
@@ -239,7 +241,7 @@ def of_blocks(
             longest = part
         done += 1
     if longest is None or done < len(spans):
-        raise ValueError(f"the blocks end before sample {spans[done][1]}")
+        raise ValueError(f"the blocks end before sample {spans[done][1]}, the end of a segment")
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         if n < _MIN_STRIDES_IN_CLUSTER * octave.DECIMATION:
@@ -273,20 +275,19 @@ def of_phase(
 def _check_arguments(
     rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[Span]
 ) -> NDArray[np.int64]:
-    """Check the common arguments, and return the sizes."""
     if not rate > 0:
-        raise ValueError(f"the rate is {rate}, expected a frequency above zero")
+        raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")
     reached = 0
     for start, stop in segments:
         if not reached <= start < stop <= samples:
             raise ValueError(
-                f"segment ({start}, {stop}) does not lie in the {samples} samples, after the one "
-                "before it"
+                f"segment ({start}, {stop}) is not valid: expected {reached} <= start < stop <= "
+                f"{samples}, as segments follow one another in the log"
             )
         reached = stop
     wanted = cluster_sizes(samples) if sizes is None else np.asarray(sizes, dtype=np.int64)
     if wanted.ndim != 1 or (wanted < 1).any():
-        raise ValueError("cluster sizes must be whole numbers from 1 in one dimension")
+        raise ValueError("cluster sizes must be whole numbers of 1 or more, of shape (m,)")
     return wanted
 
 

@@ -12,7 +12,7 @@ from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.words.findings.spectrum import MethodsDiffer
 from imubench_pipeline.words.reasons import estimates as texts
 
-_MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the reference
+_MAX_FACTOR_BEYOND_LIMITS = 1.25  # From a value without limits to the limits of the reference
 _MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
 _MIN_STATED_RATIO = 1.1  # Smaller differences of two estimates change no decision
 
@@ -59,7 +59,7 @@ def _doubt_group(
 
 
 def yield_disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield a finding for each parameter whose two best estimates are ok and exclude each other."""
+    """Yield a finding for each parameter whose robust and likelihood estimates disagree."""
     if not {"robust", "likelihood"} <= estimates.keys():
         return
     for symbol in ("N", "B_curve", "K"):

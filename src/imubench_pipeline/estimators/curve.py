@@ -55,10 +55,10 @@ class _Curve:
 def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     """Read the parameters from the slopes of an Allan deviation.
 
-    N is the value at tau = 1 s of the fitted -1/2 line, K the value at 3 s of the fitted +1/2
-    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over 1.89,
-    in SI; ``not_shown`` with the reason where the curve has no such slope. ``longest`` is the
-    longest tau that is read, as a part of the log: beyond, the curve is too uncertain.
+    N is the value at tau = 1 s of the fitted -1/2 line, K the value at 3 s of the fitted +1/2 line
+    at the end of the curve, B the minimum divided by 0.664, and T_B its tau divided by 1.89, in SI.
+    A parameter without such a slope is ``not_shown``, with the reason. ``longest`` is the longest
+    tau that is read, as a fraction of the log: beyond it, the curve is too uncertain.
     """
     used = curve.cluster_size <= longest * curve.samples
     if not (curve.variance[used] > 0).all():

@@ -43,7 +43,7 @@ class Models:
     terms: Terms
     parameters: Array  # (d, p): the linear parameters in their order, then B of each process; SI
     times: Array  # (d, g): T_B of each process, s
-    weight: float = 1.0  # of all of them together, within the T_B of other terms
+    weight: float = 1.0  # of all these models together, see `Candidate.weight`
 
     def parameter(self, letter: str) -> Array:
         """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
@@ -58,7 +58,7 @@ class Models:
 
 
 def convert_noise_model(model: NoiseModel) -> Models:
-    """Return a noise model alone, without its ramp and lines, as `Models` of one."""
+    """Return one noise model, without its ramp and lines, as `Models` with d = 1."""
     processes = model.further_processes
     letters = {"Q": model.Q, "N": model.N, "F": 0.0, "K": model.K}
     if model.T_B is None:
@@ -76,10 +76,11 @@ def convert_noise_model(model: NoiseModel) -> Models:
 
 
 def compute_curve_bias(models: Models, longest: float) -> tuple[Array, Array]:
-    """Return the bias instability of the curve of models up to a tau in s, and its tau.
+    """Return the bias instability of models from their Allan curves, and its tau.
 
-    The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or m/s²,
-    and its tau, s, both of shape (d,); of flicker noise alone, the longest tau.
+    This is the largest Allan deviation of the flicker and Gauss-Markov terms up to ``longest``, s,
+    divided by 0.664 (rad/s or m/s²), and the tau of the maximum, s; both have shape (d,). Without
+    Gauss-Markov terms the curve is flat, and tau is ``longest``.
     """
     flicker, count = models.parameter("F"), models.terms.gauss_markov
     if count == 0:
@@ -146,13 +147,13 @@ def add_curve_figures(
     draws: Mapping[Terms, Posterior],
     tau: Array,
 ) -> Estimate:
-    """Return an estimate by likelihood with the figures of its curve.
+    """Return an estimate by likelihood, with the figures of its curve (`CURVE`) added.
 
     Values follow from the model of the estimate, intervals from the draws of all models that the
-    log does not rule out, weighted by BIC. (By AIC, two processes of which the slower replaces the
-    random walk weigh as much as the walk: limits would be twice as wide as needed.) ``alike`` are
-    the models that the log does not rule out, the chosen one first; ``wider`` models with one bias
-    instability in addition, which limit an absent one; ``tau`` is from `make_averaging_times`.
+    log does not rule out, weighted by BIC. (By AIC, a slow process in place of the random walk has
+    the weight of the walk: limits would be twice as wide as needed.) ``alike`` are the models that
+    the log does not rule out, the chosen one first; ``wider`` are models with one more bias
+    instability, for the upper limit of an absent one; ``tau`` is from `make_averaging_times`.
     """
 
     def select(candidate: Candidate) -> Models:
@@ -183,7 +184,7 @@ def add_curve_figures(
 
 
 def compute_curve_figures(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
-    """Return the figures of the curve of a model as it is, at `make_averaging_times`."""
+    """Return the figures of a model's curve (`CURVE`), without limits, at averaging times, s."""
     models = convert_noise_model(model)
     if not models.terms.parameters:
         nothing = Parameter(None, "not_shown", curves.NO_NOISE)

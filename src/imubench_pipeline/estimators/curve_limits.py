@@ -32,8 +32,8 @@ def add_fitted_limits(
 
     The smaller of these degrees of freedom and the values of the identified power law apply where
     the model does not explain the log, and at tau so short that the curve shows frequencies that
-    were not fitted. Without a fit the curve is unchanged. ``segments`` are first and one-past-last
-    sample of each; ``presence`` is needed where samples are missing.
+    were not fitted. Without a fit the curve is unchanged. ``segments`` are the first and
+    one-past-last sample of each segment; ``presence`` is needed if samples are missing.
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve

@@ -39,16 +39,16 @@ equal the values of a first-order filter with a lower cut-off. The shortest boxc
 MIN_PROCESS_SAMPLES = 10.0
 """Correlation in sampling intervals: a shorter process without white noise is a filter."""
 
-MIN_BINS = 24  # Of a spectrum in which a filter is searched
-_MIN_CUTOFF = 1 / 500  # Over the rate; of first order 1 / (2 pi MIN_PROCESS_SAMPLES)
+MIN_BINS = 24  # Fewest bins of a spectrum in which a filter is searched
+_MIN_CUTOFF = 1 / 500  # Over the rate; for first order 1 / (2 pi MIN_PROCESS_SAMPLES)
 _STATED_RATIO = 1.6  # Lowest cut-off tried over the configured one
-_SCAN_CUTOFFS = 20  # Of each filter, from which the best are refined
+_SCAN_CUTOFFS = 20  # Cut-offs tried for each filter, of which the best are refined
 _MAX_BOXCAR_SAMPLES = 20  # Maximum whole number of samples whose mean is tried
 _POINTS_PER_BIN = 6  # Frequencies at which the gain in a bin is evaluated
 _TIMES_PER_DECADE = 3  # Correlation times of the processes in addition to flicker noise and a walk
-_MIN_GAIN = 3.0  # Of half the BIC by a filter: "strong" evidence (Kass and Raftery, 1995)
+_MIN_GAIN = 3.0  # Decrease of half the BIC by a filter: "strong" evidence (Kass and Raftery, 1995)
 _MAX_LEAKAGE_FRACTION = 0.01  # Maximum spectral leakage over density in a fitted bin
-_MAX_DELTA = 3.0  # Of log likelihood below the best, up to which another filter is possible
+_MAX_DELTA = 3.0  # Log likelihood below the best, up to which another filter is possible
 _HALF_CHI_SQUARED = 1.9207  # Decrease of the log likelihood at the ends of a 95 % interval
 _MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_FLOOR_RATIO = 0.03  # Power of unfiltered over filtered white noise that matters
@@ -59,7 +59,7 @@ _QUANTIZATION_MODELS = (Terms("QN"), Terms("QNFK", 1))
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The low-pass filter in a spectrum."""
+    """The low-pass filter that a spectrum shows, if any."""
 
     frequency: Parameter  # f_c (-3 dB), Hz
     kind: Kind | None = None  # None without a filter

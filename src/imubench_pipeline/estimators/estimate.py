@@ -30,7 +30,7 @@ def _get_dimension(quantity: str, parameter: TermParameter) -> str:
     if powers not in _OF_POWERS:
         raise ValueError(
             f"the parameter {parameter.symbol} has the dimension signal^{powers[0]:g} "
-            f"s^{powers[1]:g}, expected one of which `units.SI_UNITS` has the unit"
+            f"s^{powers[1]:g}, expected a dimension with a unit in `units.SI_UNITS`"
         )
     return _OF_POWERS[powers].format(quantity=quantity, signal=QUANTITIES[quantity])
 
@@ -101,11 +101,11 @@ class Parameter:
 
     @property
     def in_model(self) -> float | None:
-        """The value in the model of the log."""
+        """The value in the model of the log: ``fitted`` if it is set, else ``value``."""
         return self.value if self.fitted is None else self.fitted
 
     def checked(self) -> "Parameter":
-        """Return the parameter, ``not_identified`` where its interval is too wide to be ``ok``."""
+        """Return the parameter; an ``ok`` one with too wide an interval is ``not_identified``."""
         if self.status != "ok" or self.lower is None or self.upper is None:
             return self
         near, far = sorted((abs(self.lower), abs(self.upper)))
@@ -121,7 +121,7 @@ class Parameter:
         return replace(self.withheld(reason), lower=0.0 if is_open else self.lower)
 
     def withheld(self, reason: str) -> "Parameter":
-        """Return the parameter, ``not_identified``, with its value as ``fitted``."""
+        """Return the parameter as ``not_identified``, with its value moved to ``fitted``."""
         fitted = self.in_model
         return replace(self, value=None, status="not_identified", reason=reason, fitted=fitted)
 
@@ -207,6 +207,6 @@ def _checked(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
 
 
 def not_shown(method: str, reason: str) -> Estimate:
-    """Return the estimate of the papers' model where the log shows none of its parameters."""
+    """Return an estimate in which N, B, T_B, K and the curve are ``not_shown``, with a reason."""
     nothing = Parameter(None, "not_shown", reason)
     return Estimate(method, dict.fromkeys(PARAMETERS, nothing), curve=dict.fromkeys(CURVE, nothing))

@@ -29,9 +29,9 @@ Mask = NDArray[np.bool_]
 
 MIN_BINS = 20  # Bins that a fit needs; the papers' model has four parameters
 _LINE_MODEL_BAND = 0.05  # Fraction of the rate below which the model for line detection is fitted
-_MIN_CORRELATION_SAMPLES = 3.0  # Of the shortest process that is tried without a filter
-_MAX_FILTER_BIAS = 0.5  # Of S_N within the band, in standard errors
-_UNKNOWN_FILTER_BAND = 1 / 10  # Over the cut-off, where no filter of the family fits the bend
+_MIN_CORRELATION_SAMPLES = 3.0  # T_B of the shortest process that is tried without a filter
+_MAX_FILTER_BIAS = 0.5  # Bias of S_N within the band, in standard errors
+_UNKNOWN_FILTER_BAND = 1 / 10  # Band over the cut-off, if no filter of the family fits the bend
 _MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
 
 
@@ -66,7 +66,7 @@ class FitSelection:
         return self.low_pass.gain if self.low_pass is not None else None
 
     def whittle(self, spectrum: Spectrum, *, all_bins: bool = False) -> Whittle:
-        """Return the likelihood of the bins that are fitted, or roughly of all."""
+        """Return the likelihood of the fitted bins, or an approximate one of all bins."""
         if not all_bins:
             spectrum = spectrum.select(self.used)
         samples = _MIN_CORRELATION_SAMPLES if self.gain is None else MIN_PROCESS_SAMPLES
@@ -94,7 +94,7 @@ def select_for_fit(
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
     ``line_spectra`` are as in `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
-    is the highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
+    is the highest frequency to use, Hz, by default as far as the low-pass filter does not matter;
     ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
     step of the register, SI, or 0.
     """

@@ -26,7 +26,7 @@ _DURATION_RATIOS = np.geomspace(1e-4, 1e4, 17)  # Durations tried over the durat
 
 
 def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
-    """Return relative Cramér-Rao bounds, (m,), of `Maximum.powers`, T_B and R; infinite for 0."""
+    """Return relative Cramér-Rao bounds of the parameters, T_B and R, (m,); infinite for 0."""
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp
@@ -43,7 +43,7 @@ def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
 
 
 def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
-    """Return the bins of a gapless log of a duration, up to a frequency, without data."""
+    """Return the bins of a gapless log of a duration, s, up to ``highest``, Hz, without data."""
     samples = math.floor(rate * duration + 1e-6)
     count = min(math.floor(2.0 * highest * duration + 1e-6), samples - 1)
     edges = list(range(1, min(SINGLE, count) + 1))
@@ -73,7 +73,7 @@ def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectru
 def compute_cramer_rao_bounds(
     model: NoiseModel, rate: float, duration: float, highest: float
 ) -> dict[str, float]:
-    """Return relative Cramér-Rao bounds by `list_parameter_names`; rate and ``highest`` in Hz."""
+    """Return relative Cramér-Rao bounds by parameter name, for a log of a duration, s."""
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter, value in values.items() if value > 0)
     processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
@@ -88,7 +88,7 @@ def compute_cramer_rao_bounds(
 
 
 def list_parameter_names(terms: Terms) -> list[str]:
-    """Return the names of the parameters in the order of the bounds: a second B is B 2."""
+    """Return the names of the parameters in the order of the bounds; ``B 2`` is a second B."""
     names = ["B" if letter == "F" else letter for letter in terms.linear]
     offset = "F" in terms.linear
     numbers = [f" {i}" if i > 1 else "" for i in range(1 + offset, 1 + offset + terms.gauss_markov)]
@@ -146,12 +146,11 @@ def add_upper_limits(
     wider: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> Estimate:
-    """Return an estimate with limits of the K and B that its model does not have.
+    """Return an estimate with upper limits of K and B if its model does not have them.
 
-    ``not_identified``, with its interval, where a model that has the term is about as good as the
-    chosen one; else ``absent``, with an upper limit. ``alike`` are the models that the log does not
-    rule out, the chosen one first; ``wider`` those with a random walk, or with one bias
-    instability, in addition to its terms.
+    They are ``not_identified`` if a model with the term is about as good as the chosen one, else
+    ``absent``. ``alike`` are the models that the log does not rule out, the chosen one first;
+    ``wider`` are models with a random walk, or one bias instability, in addition to its terms.
     """
     parameters = dict(estimate.parameters)
     for name in ("K", "B"):
@@ -171,10 +170,9 @@ def add_upper_limits(
 
 
 def is_as_good(other: Candidate, chosen: Candidate) -> bool:
-    """Return whether a model is about as good as the chosen one: by AIC, or hardly worse by BIC.
+    """Return whether a model has no higher AIC than the chosen one, or a BIC higher by up to 2.
 
-    A difference of 2 is not worth more than a bare mention (R. Kass and A. Raftery, J. Am. Stat.
-    Assoc. 90, 1995).
+    Such a difference is hardly evidence (R. Kass and A. Raftery, J. Am. Stat. Assoc. 90, 1995).
     """
     return other.aic <= chosen.aic or other.bic <= chosen.bic + _ABOUT_AS_GOOD
 
@@ -187,7 +185,7 @@ def describe(
     draws: dict[Terms, Posterior],
     highest: float,
 ) -> Estimate:
-    """Describe a fit: values with intervals, what is not identified, and what is absent.
+    """Return the estimate of a fit: a value with its interval, or a status, by parameter.
 
     The intervals of all parameters cover the models ``alike``, ``chosen`` among them, weighted by
     AIC. K is the median over them: they share the power of the lowest frequencies in different
@@ -264,13 +262,12 @@ def compute_mixture_quantiles(
 
 
 def compute_mixture_limits(parts: Sequence[tuple[Array, float]], own: Array) -> tuple[float, float]:
-    """Return the 95 % limits of draws of several models; those of one of them lie inside."""
+    """Return the 95 % limits of draws of several models, widened to the limits of ``own``."""
     both = [compute_mixture_quantiles(draws, 0.025, 0.975) for draws in (parts, [(own, 1.0)])]
     return min(lower for lower, _ in both), max(upper for _, upper in both)
 
 
 def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
-    """Return the draws of a parameter of a model."""
     posterior = draws[terms]
     columns = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
     return np.asarray(columns[:, list_parameter_names(terms).index(name)])

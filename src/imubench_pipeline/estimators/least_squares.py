@@ -48,7 +48,7 @@ _MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at e
 
 
 class UnfitCurveError(ValueError):
-    """An Allan variance to which no model can be fitted; the text says why."""
+    """An Allan variance to which no model can be fitted; the message states the reason."""
 
 
 def fit(
@@ -60,22 +60,22 @@ def fit(
 ) -> Estimate:
     """Fit N, B, T_B and K to an Allan variance.
 
-    C = sum_i w_i (variance_i - model(tau_i))^2 with
+    The cost is sum_i w_i (variance_i - model(tau_i))^2. With n of L samples in a cluster,
 
-    - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
+    - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, one over the variance of an Allan variance;
     - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), for the papers' figures.
-      Its dimension differs from the cost: the bottom of the curve counts less, which makes little
+      This cost has a dimension, so that the bottom of the curve counts less, which makes little
       difference on these tau (`tests/papers/test_panel.py`).
 
-    ``longest`` is the longest tau of the fit, as a part of the log. The shortest is where the curve
-    begins to follow a model of its longer tau: the sensor's own filter bends it before.
+    ``longest`` is the longest tau of the fit, as a fraction of the log. The shortest is the tau
+    above which the curve follows the fitted model: below, the sensor's own filter bends the curve.
 
     The parameters are in SI, with 95 % limits from the covariance of the Allan variances. Without
     limits, which take most of the time, no parameter is ``not_identified``.
-    ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the search, which
-    goes as far as the process still peaks inside the tau used; ``not_identified``: the log cannot
-    determine the value (`add_limits`). Raises UnfitCurveError if fewer than four points lie within
-    ``longest``, or the Allan variance is 0 at one; ValueError if the method is not known.
+    ``absent``: the fit is best without the term; ``at_bound``: T_B is at the end of its range, in
+    which the process peaks within the tau used; ``not_identified``: the log cannot determine the
+    value (`add_limits`). Raises UnfitCurveError if fewer than four points lie within
+    ``longest``, or a variance is 0; ValueError if the method is not known.
     """
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _MIN_POINTS:
@@ -232,10 +232,10 @@ _MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is
 _MAX_RELATIVE_ERROR_TIME = 0.75
 """Beyond it B is not identified either: in white logs B often seems known, T_B in 1 of 200."""
 
-_MAX_RELATIVE_ERROR_HELD = 0.25  # Of B with T_B fixed, and of N and K with B fixed
+_MAX_RELATIVE_ERROR_HELD = 0.25  # The same for B with T_B fixed, and for N and K with B fixed
 _CLIP_RELATIVE_ERROR = 10.0  # Larger ones would overflow in the limits
 _LOG_TIME_STEP = 1e-3  # Step of log T_B in the finite difference
-_LOG_PARAMETER_STEP = 0.05  # Of the finite differences of the lowest point
+_LOG_PARAMETER_STEP = 0.05  # Step of the finite differences of the lowest point
 
 
 @dataclass(frozen=True)

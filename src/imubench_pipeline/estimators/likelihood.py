@@ -86,19 +86,19 @@ def fit(
     """Estimate the noise parameters of a log by their likelihood (P. Whittle, Ark. Mat. 2, 1953).
 
     ``samples``, shape (L,), are the log on its uniform grid, rad/s or m/s², NaN where one is
-    missing; the rate is in Hz. ``segments`` are first and one-past-last sample of each part that no
-    time relates to the others; ``band`` is the highest frequency to use, Hz, by default found from
-    the spectrum; ``bandwidth`` the stated cut-off of the sensor's own filter, Hz: it distinguishes
-    a filter from a process; ``resolution`` the step of the register (LSB), SI, where the samples
-    are rounded; ``rng`` is for posterior draws and missing samples, by default always the same.
-    Raises ValueError if the log has fewer than 16 samples.
+    missing; the rate is in Hz. ``segments`` are first and one-past-last sample of each part, if the
+    time between parts is unknown; ``band`` is the highest frequency to use, Hz, by default found
+    from the spectrum; ``bandwidth`` is the stated cut-off of the sensor's own filter, Hz: it
+    distinguishes a filter from a process; ``resolution`` is the step of the register (LSB), SI;
+    ``rng`` is for posterior draws and missing samples, by default with a fixed seed. Raises
+    ValueError if the log has fewer than 16 samples, or none is present.
     """
     values = np.asarray(samples, dtype=np.float64)
     if len(values) < 16:
         raise ValueError(f"the log has {len(values)} samples, expected 16 or more")
     present = np.isfinite(values)
     if not present.any():
-        raise ValueError(f"none of the {len(values)} samples is present")
+        raise ValueError(f"none of the {len(values)} samples is finite; expected 16 or more")
     return fit_blocks(
         lambda: [values],
         len(values),
@@ -127,8 +127,8 @@ def fit_blocks(
     """Estimate the noise parameters of a log that comes in blocks, in bounded memory (see `fit`).
 
     Missing samples are drawn from their distribution, first by the model of the Allan variance,
-    then by the likelihood's own model, more often if more are missing; the bins count for the
-    samples present only.
+    then by the model of the likelihood, in more rounds if more are missing; the weights of the bins
+    are reduced by the fraction that is missing.
 
     ``blocks`` returns the log in order, in SI, at every call, NaN where a sample is missing;
     ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing.
@@ -141,7 +141,7 @@ def fit_blocks(
     means = missing.average_blocks(blocks(), spans)
     parts = missing.split_at_gaps(means, spans)
     if not parts:
-        raise ValueError(f"none of the {samples} samples is present")
+        raise ValueError(f"none of the {samples} samples is finite; expected 16 or more")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
     gaps = count_gaps(blocks())
     curve = of_blocks(blocks(), samples, rate, holes=True, gaps=gaps, segments=spans)
@@ -253,7 +253,6 @@ class _InTheLog:
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
-        """Return the parameters, the figures of the curve, and their intervals."""
         chosen, spectrum = self.alike[0], self._whittle.spectrum
         estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._highest)
         estimate = add_upper_limits(estimate, self.alike, self.wider, self.draws)
@@ -261,7 +260,6 @@ class _InTheLog:
         return add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
 
     def draw_jointly(self) -> JointDraws:
-        """Return draws over all models that the log does not rule out."""
         bins, longest = len(self._whittle.spectrum.density), self._whittle.longest
         # The weight of a single model, which may be 0, does not matter.
         parts = [

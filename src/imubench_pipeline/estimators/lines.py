@@ -37,7 +37,7 @@ _WIDTH_LEVEL = 0.1  # Fraction of the highest excess at which the width of a lin
 _NEIGHBOUR_START, _NEIGHBOUR_END = 5, 20  # Bins from a sinusoid to its neighbourhood
 _MAX_NEIGHBOUR_CHANCE = 1e-4
 _MIN_AMPLITUDE_RATIO = 1.1
-_MAX_LINE_LEAKAGE = 0.3  # Into a bin of the likelihood, in standard errors of the bin
+_MAX_LINE_LEAKAGE = 0.3  # Leakage into a bin of the likelihood, in standard errors of the bin
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
@@ -71,14 +71,14 @@ class Line:
 
     @property
     def term(self) -> Sinusoid:
-        """The noise term."""
+        """The line as a term of a noise model."""
         return Sinusoid(self.amplitude, self.frequency)
 
 
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the lines by frequency; block means serve up to ``crossover``, Hz, samples above."""
+    """Return the lines by frequency; block means show lines up to ``crossover``, Hz."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0
@@ -170,7 +170,6 @@ def _estimate_line(
     group: NDArray[np.int64],
     rate: float,
 ) -> Line:
-    """Return the line of a group of significant bins."""
     step = float(spectrum.frequency[1])
     n = spectrum.segments
     peak = int(group[np.argmax(standing[group])])
@@ -226,7 +225,7 @@ def _is_above_neighbours(spectrum: LineSpectrum, peak: int) -> bool:
 
 
 def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
-    """Return the bins without leakage from lines, given the fitted density, shape (b,)."""
+    """Return a mask of the bins without leakage from lines, given the fitted density, (b,)."""
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _MAX_LINE_LEAKAGE * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
     for line in lines:

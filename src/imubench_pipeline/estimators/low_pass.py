@@ -25,7 +25,7 @@ from imubench_pipeline.typing import Array
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
 BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
-_ALIASES = 3  # Of flicker noise on each side; the filter leaves little of the others
+_ALIASES = 3  # Aliases of flicker noise on each side; the filter leaves little of the others
 _GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 
@@ -64,7 +64,7 @@ class Filter:
         return np.asarray(np.maximum(np.pi * ratio / self.order * total, 1e-12))
 
     def slow(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return the power gain for noise that is slow against the rate, without aliases."""
+        """Return the power gain for noise that is slow compared with the rate, without aliases."""
         f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "boxcar":
             return np.asarray(np.sinc(f * BOXCAR_CUTOFF_LENGTH / self.cutoff) ** 2)
@@ -86,7 +86,7 @@ class Filter:
         return np.asarray(sampled * total)
 
     def half_power(self, rate: float) -> float:
-        """Return the frequency, Hz, at which filtered white noise is halved; a boxcar aliases."""
+        """Return the frequency, Hz, at which G is half of G(0), for a boxcar with its aliases."""
         if self.kind != "boxcar":
             return self.cutoff
         half = 0.5 * float(self.white(0.0, rate))
@@ -97,8 +97,8 @@ class Filter:
         """Return the spectral leakage of the DCT-II of filtered white noise, as a density.
 
         The even continuation of a smooth signal has discontinuous slopes at its ends. They add the
-        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences.
-        ``length`` is the duration of the transform at each frequency, s.
+        density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, with V the variance of first differences,
+        w = 2 pi f T, and ``length`` = n T the duration of the transform at each frequency, s.
         """
         grid = (np.arange(_GRID_SIZE) + 0.5) / _GRID_SIZE * 0.5 * rate
         variance = float(np.mean(self.white(grid, rate) * _difference_gain(grid, rate))) * rate

@@ -21,7 +21,7 @@ from imubench_pipeline.typing import Array
 
 BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
 _MAX_GAP_BLOCKS = 1024  # A longer gap splits the log: both sides are independent
-_MIN_DRIVE = 1e-9  # Of the slow part over a block, over the white noise of a mean: it is constant
+_MIN_DRIVE = 1e-9  # Least step variance of the slow part, over the white noise variance of a mean
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class BlockMeans:
     count: NDArray[np.int64]  # (b,): samples present
 
     def within(self, start: int, stop: int) -> slice:
-        """Return the blocks from one sample to another."""
+        """Return the slice of the blocks that begin between two samples."""
         first, last = np.searchsorted(self.begin, [start, stop])
         return slice(int(first), int(last))
 
@@ -68,11 +68,10 @@ def average_blocks(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMe
 def yield_present_samples(
     parts: Iterable[Array], begin: NDArray[np.int64], end: NDArray[np.int64]
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
-    """Yield the samples of a log that are present, and the blocks that they belong to.
+    """Yield the block numbers of the samples that are present, and these samples, part by part.
 
     The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
-    (b,), first and one-past-last sample of each block, rising. Samples outside the blocks are left
-    out.
+    (b,), first and one-past-last sample of each block, rising. Other samples are left out.
     """
     reached = 0
     for values in parts:
@@ -85,7 +84,7 @@ def yield_present_samples(
 
 
 def split_at_gaps(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
-    """Divide segments at gaps that are too long to fill, and trim their ends."""
+    """Return segments divided at gaps that are too long to fill, with their ends trimmed."""
     parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
@@ -154,7 +153,7 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with missing samples (NaN) drawn: path plus white noise."""
+    """Yield the blocks of a log, with missing samples (NaN) replaced by path plus white noise."""
     reached = 0
     for values in blocks:
         missing = np.flatnonzero(~np.isfinite(values))

@@ -28,12 +28,12 @@ class Goodness:
 def assess_goodness_of_fit(
     nu: Array, data: Array, density: Array, frequency: Array, parameters: int
 ) -> Goodness:
-    """Test the standardised residuals of a binned spectrum, its columns of shape (b,).
+    """Test whether a model explains a binned spectrum; the arrays have shape (b,).
 
-    Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, measured
-    over fitted density, with the mean and variance of chi-squared variates; and the
-    correlation of neighbouring residuals, which shows a shape that the model does not have.
-    ``parameters`` are the free ones of the model.
+    Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) of nu ordinates, with
+    r = ``data`` / ``density``, measured over fitted, against the mean and variance of chi-squared
+    variates; and the correlation of neighbouring residuals, which shows a shape that the model does
+    not have. ``parameters`` is the number of free parameters of the model.
     """
     ratio = np.maximum(data / density, 1e-300)
     deviance = nu * (ratio - 1.0 - np.log(ratio))
@@ -78,7 +78,7 @@ CANDIDATE_MODELS = (
 """Models that are always fitted. A ramp and quantization noise are then added to the best one; if
 BIC favours quantization noise, it is added to all of them."""
 
-WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; a slower process looks like a walk
+WALK_LIKE_TIME_FRACTION = 1 / 10  # Of the longest T_B; above it, a process looks like a walk
 
 BIC_PENALTY_UNIT_ROOT = 4.0
 """Added to the BIC of a model with such a process, or with a ramp, but without a random walk, which
@@ -113,7 +113,7 @@ class Candidate:
 
 
 def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
-    """Return all candidates, with quantization noise if it is visible, sorted by BIC."""
+    """Return all fitted models, sorted by BIC; ``quantization``: whether Q may be visible."""
     bins = len(whittle.spectrum.density)
     tried: dict[Terms, Maximum] = {}
 

@@ -32,7 +32,7 @@ from imubench_pipeline.estimators.whittle_kernels import Problem, interpolate_sh
 from imubench_pipeline.typing import Array
 
 _MIN_DEGREES = 5
-_FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
+_FIRST_MIXTURE_WEIGHT = 0.15  # In later mixtures, to keep the whole support covered
 _MIN_COMPONENT_MASS = 0.01
 _LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
 _EM_STEPS = 3  # Expectation-maximisation steps between two rounds
@@ -67,7 +67,6 @@ class Mixture:
 
     @cached_property
     def _inverses(self) -> Array:
-        """Inverses of the roots of the scales."""
         return np.linalg.inv(np.linalg.cholesky(self.scales))
 
     def fitted(self, points: Array) -> "Mixture":
@@ -84,7 +83,7 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Weighted:
-    """Points and their weights."""
+    """Points drawn from a density, with their importance weights."""
 
     points: Array  # (n, d)
     weights: Array  # (n,): they sum up to 1
@@ -95,7 +94,7 @@ class Weighted:
         return float(1.0 / np.sum(self.weights**2))
 
     def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
-        """Return indices of equally weighted points, in random order (systematic resampling)."""
+        """Return indices of points drawn by weight, in random order (systematic resampling)."""
         ends = np.cumsum(self.weights)
         places = (np.arange(number) + rng.random()) / number * ends[-1]
         which = np.minimum(np.searchsorted(ends, places), len(ends) - 1)
@@ -116,7 +115,7 @@ def sample_adaptively(
     Adaptive multiple importance sampling (J.-M. Cornuet et al., Scand. J. Stat. 39, 2012).
     ``log_density`` returns the logarithm of the density at points, shape (n, d), up to a constant,
     -inf where it is 0; ``first`` is the proposal of the first round; a round has ``size`` points, a
-    power of 2, all have ``most``; ``wanted`` is the effective sample size.
+    power of 2, all rounds at most ``most``; ``wanted`` is the effective sample size.
     """
     mixtures, mixture = [first], first
     points = np.empty((0, first.means.shape[1]))
@@ -175,7 +174,7 @@ class Posterior:
 def sample(
     whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = MAX_DRAWS
 ) -> Posterior:
-    """Draw from the posterior of a model around its best fit, also terms that are 0 there."""
+    """Draw from the posterior of a model around its best fit, including terms that are 0 in it."""
     target = _Target(whittle, maximum)
     wanted = draws / _DRAWS_PER_POINT
     size = 1 << max(9, math.ceil(math.log2(wanted)))
@@ -216,7 +215,6 @@ class _Target:
         self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _MIN_START_SIGMAS / size))
 
     def log_density(self, points: Array) -> Array:
-        """Return the logarithm of the posterior at points, up to a constant."""
         result = np.full(len(points), -np.inf)
         inside = (points[:, : self.terms] > 0.0).all(axis=1)
         if inside.any():

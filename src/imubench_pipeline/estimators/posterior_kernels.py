@@ -31,7 +31,7 @@ _LONGEST_STEP = 1.5
 def compute_log_posterior(
     point: Array, problem: Problem, model: Array, shape: Array
 ) -> tuple[float, float, float]:
-    """Return the log posterior at a point, the best R and its information; model is set."""
+    """Return the log posterior at a point, the best R and its information; overwrite ``model``."""
     fixed, bins, with_ramp, table = problem
     b, linear = fixed.shape
     processes = (point.size - linear) // 2
@@ -179,7 +179,7 @@ def _square(point: Array, mean: Array, inverse: Array) -> float:
 def set_densities(
     points: Array, weights: Array, means: Array, inverses: Array, freedom: int, densities: Array
 ) -> None:
-    """Set weight times density of each component of a mixture, up to a constant, shape (n, c)."""
+    """Set ``densities``, (n, c), to weight times density of each component, up to a constant."""
     n, d = points.shape
     for k in range(weights.size):
         factor = weights[k]
@@ -205,7 +205,11 @@ def fit_mixture(
     new_means: Array,
     new_scales: Array,
 ) -> int:
-    """Set the components that are kept, from the densities at points; return their number."""
+    """Fill the new components from the densities at points; return how many are kept.
+
+    Components with a mass up to ``least``, or with too few effective points, are dropped. ``parts``
+    are the densities, and are overwritten; ``new_scales`` are 0 at the start.
+    """
     n, d = points.shape
     near = np.empty(n)
     for i in range(n):

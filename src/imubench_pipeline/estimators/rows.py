@@ -63,7 +63,7 @@ def make_parameter_rows(
 
 
 def make_draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
-    """Yield the rows of the table ``read_draws``; none for an estimate without joint draws."""
+    """Yield the rows of the table ``draws``; none for an estimate without joint draws."""
     if estimate.draws is None:
         return
     for number, (first, further) in enumerate(
@@ -78,7 +78,7 @@ def make_draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
 
 
 def read_draws(path: Path) -> dict[tuple[str, str], JointDraws]:
-    """Read the table ``read_draws`` of a recording, by channel and method."""
+    """Read the table ``draws`` of a recording: joint draws by channel and method."""
     joint_draws = {}
     for (channel, method), table in split_table(read("draws", [path]), "channel", "method").items():
         columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
@@ -119,7 +119,7 @@ def read_estimates(
 
 
 def make_estimate(method: str, rows: Iterable[ParameterRow]) -> Estimate:
-    """Return the estimate from its rows of the table ``parameters``."""
+    """Return the estimate of a method from its rows of the table ``parameters``."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}
     of_curve: dict[str, Parameter] = {}

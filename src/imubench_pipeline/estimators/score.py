@@ -38,7 +38,7 @@ class Scores:
 
 
 def weights(error: Array) -> Array:
-    """Return the weight of each tau, of sum 1, from the relative standard error, shape (m,)."""
+    """Return weights of tau, with the sum 1, from the relative standard errors, shape (m,)."""
     weight = 1.0 / (error**2 + SUREST**2)
     return np.asarray(weight / weight.sum())
 
@@ -49,13 +49,13 @@ def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
 
 
 def beats(one: Array, other: Array) -> float:
-    """Return the probability that a draw of one, shape (k,), has a lower RMS than of other."""
+    """Return the probability that an RMS out of ``one``, shape (k,), is below one of ``other``."""
     place = np.searchsorted(np.sort(other), one, side="right")
     return float(1.0 - np.mean(place) / other.size)
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Score a model against a curve and its relative error, shape (m,), SI, by draws (k, m)."""
+    """Return scores of a model, shape (m,), and its draws, (k, m), against a curve, (m,), SI."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

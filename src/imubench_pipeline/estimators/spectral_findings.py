@@ -16,7 +16,7 @@ from imubench_pipeline.words.findings import spectrum as words
 from imubench_pipeline.words.reasons import estimates as texts
 
 _MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over the integral of white noise after 1 s
-_MAX_SLOW_FREQUENCY = 0.05  # Over the rate, of the test for missing slow noise
+_MAX_SLOW_FREQUENCY = 0.05  # Highest frequency over the rate in the test for missing slow noise
 _MIN_FLAT_RATIO = 0.95  # Minimum fitted density over N^2, below the effect of a low-pass filter
 _MIN_ORDINATES = 4.0
 _MAX_DENSITY_RATIO = 0.7  # Density over N^2 below which slow noise is missing

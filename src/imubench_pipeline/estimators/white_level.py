@@ -16,8 +16,8 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_mode
 from imubench_pipeline.noise import compute_driving_density
 from imubench_pipeline.typing import Array
 
-_MAX_PROCESS_SHARE = 0.06  # Of the Allan variance, up to which it has the slope of white noise
-_MIN_TAU_OVER_TIME = 25.0  # Up to which the level of white noise and process must be visible
+_MAX_PROCESS_SHARE = 0.06  # Share of the Allan variance that hardly changes the white slope
+_MIN_TAU_OVER_TIME = 25.0  # Tau over T_B at which the level of both must be visible
 _MIN_WHITE_SAMPLES = 15.0  # Longest cluster with this slope, where white noise is visible
 
 
@@ -41,7 +41,7 @@ def count_fast_processes(maximum: Maximum, rate: float) -> int:
 
 
 def merge_fast_processes(maximum: Maximum, number: int) -> Maximum:
-    """Return a fit whose ``number`` fastest processes are part of its white noise."""
+    """Return a fit with its ``number`` fastest processes merged into the white noise."""
     if not number:
         return maximum
     linear, powers = len(maximum.terms.linear), maximum.powers.copy()
@@ -56,10 +56,10 @@ def merge_fast_processes(maximum: Maximum, number: int) -> Maximum:
 
 
 def merge_fast_draws(posterior: Posterior, terms: Terms, number: int) -> Posterior:
-    """Return draws of a model whose ``number`` fastest processes are part of its white noise.
+    """Return draws of a model with its ``number`` fastest processes merged into white noise.
 
-    The processes of a draw are in the order of T_B: where one is merged, all faster than a second
-    are, as a weak process may be faster than the strong one.
+    All processes of a draw that are faster than a second are merged too: a draw has them in the
+    order of T_B, and a weak process may be faster than the strong one.
     """
     if not number:
         return posterior

@@ -130,18 +130,18 @@ def _flicker_edge(order: float) -> float:
 
 SHAPES = 192  # Correlation times at which the shape of a Gauss-Markov process is tabulated
 COARSE = 48  # Correlation times that suffice to detect lines and the band
-_GRID_STEPS = {1: 4, 2: 8}  # Of the table of shapes, between places where a search may start
+_GRID_STEPS = {1: 4, 2: 8}  # Steps of the table between starts, by number of processes
 _MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
 _SCAN_TOLERANCE = 1e-2  # Tolerance of the cost when correlation times are only compared
 _POLISH_TOLERANCE = 1e-6
 _LOG_TIME_TOLERANCE = 5e-4  # Tolerance of the logarithm of a correlation time
 _MAX_TURNS = 8
-_MIN_TURN_GAIN = 1e-4  # Of log likelihood by a turn over both correlation times
+_MIN_TURN_GAIN = 1e-4  # Gain of log likelihood by a turn over both correlation times
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Terms of a model: letters of Q, N, F and K, Gauss-Markov processes, and a ramp."""
+    """Terms of a model: letters out of QNFK, number of Gauss-Markov processes, and a ramp."""
 
     linear: str
     gauss_markov: int = 0
@@ -157,7 +157,7 @@ class Terms:
 
     @property
     def biases(self) -> tuple[bool, int]:
-        """Whether it has flicker noise, and how many Gauss-Markov processes."""
+        """Whether the model has flicker noise, and how many Gauss-Markov processes."""
         return "F" in self.linear, self.gauss_markov
 
     @property
@@ -193,7 +193,7 @@ class Maximum:
 
 
 class Whittle:
-    """The likelihood of one spectrum, with ``shapes`` correlation times between two, s."""
+    """The likelihood of one spectrum, for T_B from ``shortest`` to ``longest``, s."""
 
     def __init__(
         self, spectrum: Spectrum, shortest: float, longest: float, shapes: int = SHAPES
@@ -244,13 +244,13 @@ class Whittle:
         return shape
 
     def shape_table(self, unit: float = 1.0) -> ShapeTable:
-        """Return the table of shapes in units of a density."""
+        """Return the table of shapes of Gauss-Markov processes, divided by a density ``unit``."""
         first = float(np.log(self.times[0]))
         step = (float(np.log(self.times[-1])) - first) / (len(self.times) - 1)
         return ShapeTable(first, step, self.table - np.log(unit) if unit != 1.0 else self.table)
 
     def bins(self, ramp_unit: float = 1.0) -> Bins:
-        """Return the bins in units of `scale`, and of a ramp."""
+        """Return the bins with densities in units of `scale`, and ramps in ``ramp_unit``."""
         spectrum = self.spectrum
         return Bins(
             spectrum.ordinates,
@@ -260,7 +260,7 @@ class Whittle:
         )
 
     def matrix(self, terms: Terms, times: Array) -> Array:
-        """Return the densities of unit terms, shape (b, p)."""
+        """Return the densities of unit terms in the bins, shape (b, p), processes last."""
         columns = [self.column(letter) for letter in terms.linear]
         columns += [self.gauss_markov(float(time)) for time in times]
         return np.column_stack(columns)

@@ -27,7 +27,7 @@ class Bins(NamedTuple):
 
 
 class ShapeTable(NamedTuple):
-    """Logarithms of process densities, shape (t, b), at log T_B (s) from ``first`` by ``step``."""
+    """Logarithms of densities, shape (t, b), of processes at log T_B = ``first`` + i ``step``."""
 
     first: float
     step: float
@@ -45,7 +45,7 @@ class Problem(NamedTuple):
 
 @njit(cache=True)
 def interpolate_shape(where: float, table: ShapeTable, shape: Array) -> None:
-    """Interpolate the logarithm of a tabulated shape linearly in log T_B."""
+    """Set ``shape`` at log T_B = ``where``; its logarithm is interpolated linearly."""
     logarithms = table.logarithms
     place = min(max((where - table.first) / table.step, 0.0), logarithms.shape[0] - 1.000001)
     i = int(place)
@@ -56,7 +56,7 @@ def interpolate_shape(where: float, table: ShapeTable, shape: Array) -> None:
 
 @njit(cache=True)
 def compute_cost(nu: Array, data: Array, density: Array) -> float:
-    """Return 1/2 sum nu (log S + I / S); infinite where a density is not above 0."""
+    """Return 1/2 sum nu (log S + I / S) of data I, density S; infinite if an S is not above 0."""
     total = 0.0
     for i in range(nu.size):
         if not density[i] > 0.0:
@@ -261,7 +261,7 @@ def fit_powers(
 
 @njit(cache=True)
 def profile_cost(places: Array, problem: Problem, tolerance: float) -> float:
-    """Return the cost at logarithms of correlation times, profiled over everything else."""
+    """Return the cost at logarithms of correlation times, minimised over other parameters."""
     fixed, bins, with_ramp, table = problem
     b, p = fixed.shape
     columns = np.empty((b, p + places.size))

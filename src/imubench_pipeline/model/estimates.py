@@ -89,7 +89,7 @@ class ModelRow(ChannelRow):
     log_likelihood: Annotated[float, "up to a constant of the channel"]
     bic: Annotated[float, "-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R"]
     aic: Annotated[float, "-2 log likelihood + 2 free"]
-    weight: Annotated[float, "weight weight of the model among the candidates, by BIC"]
+    weight: Annotated[float, "information weight of the model among the candidates, by BIC"]
     deviance: Annotated[float | None, "mean deviance of a bin; about 1 for a correct model"] = None
     chance: Annotated[float | None, "probability of so poor a fit for a correct model"] = None
     verdict: Annotated[GoodnessVerdict, "whether the model explains the spectrum"]

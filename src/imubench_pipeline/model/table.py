@@ -86,11 +86,11 @@ class TypedColumn:
 
     @property
     def is_list(self) -> bool:
-        """Whether a value is a list."""
+        """Whether the values are lists."""
         return bool(pa.types.is_list(self.type))
 
     def read(self, content: pa.ChunkedArray) -> list[Any]:
-        """Return the values of a column of an Arrow table, as rows have them."""
+        """Return the values of this column, from an Arrow table, in the types of the rows."""
         # The general `to_pylist` makes an object of Arrow for each value.
         if pa.types.is_floating(content.type):
             values: list[Any] = content.to_numpy().tolist()
@@ -108,7 +108,7 @@ class TypedColumn:
         return self.from_arrow(content.to_pylist())
 
     def from_arrow(self, values: list[Any]) -> list[Any]:
-        """Return values of the column in Python, as a row has them."""
+        """Convert Python values from Arrow: lists become tuples, and structs dataclasses."""
         if not self.is_list:
             return values
         if self.parts is None:
@@ -154,7 +154,7 @@ class TableRow(_Attributes):
 
     @classmethod
     def taken_from(cls, source: object, /, **columns: object) -> Self:
-        """Return a row with some columns, and all others that a source has by the same names."""
+        """Return a row with ``columns``; the other columns are attributes of ``source``."""
         names = [name for name in names_of(cls) if hasattr(source, name)]
         return cls(**{**{name: getattr(source, name) for name in names}, **columns})
 
@@ -177,7 +177,7 @@ AnyRow = TableRow | Mapping[str, Any]
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
 def table(name: str, key: tuple[str, ...] = ()) -> Callable[[type[R]], type[R]]:
-    """Return a decorator that makes a class the rows of a table, which ``key`` identifies."""
+    """Return a decorator that declares a class of rows; the columns ``key`` identify a row."""
 
     def declare(cls: type[R]) -> type[R]:
         made = row(cls)
@@ -190,7 +190,7 @@ def table(name: str, key: tuple[str, ...] = ()) -> Callable[[type[R]], type[R]]:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
 def row(cls: type[R]) -> type[R]:
-    """Declare a class as a part of rows of tables; it becomes a dataclass."""
+    """Make a class of columns a frozen dataclass, without declaring a table of its own."""
     # Rows are equal as mappings are.
     return dataclass(frozen=True, slots=True, kw_only=True, eq=False)(cls)
 
@@ -206,14 +206,14 @@ _COLUMNS: dict[type, tuple[TypedColumn, ...]] = {}
 
 
 def names_of(cls: type[TableRow]) -> tuple[str, ...]:
-    """Return the columns of a table by the class of its rows."""
+    """Return the names of the columns of a class of rows."""
     if cls not in _NAMES:
         _NAMES[cls] = tuple(field.name for field in fields(cls))  # type: ignore[arg-type]  # a dataclass
     return _NAMES[cls]
 
 
 def columns_of(cls: type[TableRow]) -> tuple[TypedColumn, ...]:
-    """Return the columns of a table by the class of its rows, with their Arrow types."""
+    """Return the columns of a class of rows, with their Arrow types."""
     if cls not in _COLUMNS:
         hints = get_type_hints(cls, include_extras=True)
         _COLUMNS[cls] = tuple(_typed(name, hints[name]) for name in names_of(cls))
@@ -233,7 +233,7 @@ def _typed(name: str, hint: Any) -> TypedColumn:
 
 
 def arrow_type(kind: Any) -> pa.DataType:
-    """Return the Arrow type of a type of a field: plain, a category, a list or a struct."""
+    """Return the Arrow type for a Python type: plain, ``Literal``, tuple or dataclass."""
     if get_origin(kind) is Literal:
         return CATEGORY
     if get_origin(kind) is tuple:

@@ -25,9 +25,9 @@ Property = Literal[
 class Condition:
     """An unknown figure, or property, on which a verdict depends.
 
-    ``subject`` is the quantity (gyro, accel), or the axis of a property; ``largest`` is the largest
-    figure with which every limit is met, 1 sigma, SI (None: of a property). Of ``printing`` sensors
-    of the catalogue that print the figure, ``within`` are within it.
+    ``subject`` is the quantity (gyro, accel), or the axis of a property. ``largest`` is the largest
+    figure with which every limit is met, 1 sigma, SI; None for a property. In the catalogue,
+    ``printing`` sensors print this figure; for ``within`` of them it is at most ``largest``.
     """
 
     figure: states.Cause | None
@@ -70,7 +70,7 @@ class ErrorSource:
 
 @dataclass(frozen=True, slots=True)
 class Share(ErrorSource):
-    """A source of an error, and its part of the variance."""
+    """A source of an error, with its share of the variance, 0 to 1."""
 
     share: float = field(kw_only=True)
     origin: states.Origin | None = None

@@ -61,7 +61,7 @@ def _evaluate_scalar_phi(order: int, z: complex) -> complex:
 
 
 def evaluate_decay(order: int, x: Real) -> Real:
-    """Return phi_k(-x) for a real x from 0: it is 1/k! at 0 and decreases."""
+    """Return phi_k(-x) for x from 0 and k = ``order``: it is 1/k! at 0 and decreases."""
     return evaluate_phi(order, -x).real
 
 
@@ -69,8 +69,8 @@ def integrate_squared_response(order: int, x: Real) -> Real:
     """Return x^-(2m+3) times the integral of E(v)^2 from 0 to x, E(v) = v^(m+1) phi_{m+1}(-v).
 
     E is the response to a pulse of a Gauss-Markov process with unit correlation time and m + 1
-    integrations. With E_k(x) = x^k phi_k(-x), for which E_k' = E_{k-1} = x^(k-1) / (k-1)! - E_k,
-    integration by parts gives
+    integrations; m is ``order``. With E_k(x) = x^k phi_k(-x), for which
+    E_k' = E_{k-1} = x^(k-1) / (k-1)! - E_k, integration by parts gives
 
         sum_{j=0..m} (-1)^j x^(m-j) / (m-j)! E_{m+2+j}(x) - E_{m+1}(x)^2 / 2.
     """

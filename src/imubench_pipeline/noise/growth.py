@@ -46,17 +46,17 @@ SensorStart = Calibrated | Uncalibrated
 
 
 def of_constant(order: int, time: float) -> float:
-    """Return c = t^(m+1) / (m+1)!, the growth of a constant error of 1."""
+    """Return c = t^(m+1) / (m+1)!, the integrated constant error of 1; m is ``order``."""
     return time ** (order + 1) / math.factorial(order + 1)
 
 
 def of_white(order: int, time: float) -> float:
-    """Return t^(2m+1) / ((2m+1) m!^2), the variance of integrated white noise with N = 1."""
+    """Return t^(2m+1) / ((2m+1) m!^2), the variance of integrated white noise; m is ``order``."""
     return time ** (2 * order + 1) / ((2 * order + 1) * math.factorial(order) ** 2)
 
 
 def of_white_mean(order: int, time: float, start: SensorStart) -> float:
-    """Return c^2 / W, the variance due to the estimated mean of white noise with N = 1."""
+    """Return c^2 / W, the variance by the mean of white noise in the window; 0 without a window."""
     if isinstance(start, Uncalibrated):
         return 0.0
     return of_constant(order, time) ** 2 / start.window

@@ -15,10 +15,10 @@ _MAX_ORDER = 10
 
 @dataclass(frozen=True)
 class LowPass:
-    """A low-pass filter of unit gain at rest: v' = F v + b u, y = c v.
+    """A low-pass filter of unit gain at 0 Hz: v' = F v + b u, y = c v, from input u to output y.
 
-    It is a cascade of sections of first and second order, so that its states have the magnitude of
-    the signal at any cut-off frequency. Raises ValueError if a figure is out of its range.
+    It is a cascade of sections of first and second order, so that the states v have the magnitude
+    of the signal at any cut-off frequency. Raises ValueError if cut-off or order is out of range.
     """
 
     cutoff: float  # frequency at which the power is halved (-3 dB), Hz, above 0
@@ -26,7 +26,7 @@ class LowPass:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cutoff) and self.cutoff > 0):
-            raise ValueError(f"the cut-off is {self.cutoff}, expected a frequency above 0")
+            raise ValueError(f"the cut-off is {self.cutoff} Hz, expected a frequency above 0")
         if not 1 <= self.order <= _MAX_ORDER:
             raise ValueError(f"the order is {self.order}, expected 1 to {_MAX_ORDER}")
 
@@ -37,7 +37,7 @@ class LowPass:
 
     @property
     def transition(self) -> Array:
-        """F, shape (order, order), 1/s."""
+        """State matrix F, shape (order, order), 1/s."""
         sections = self._sections()
         matrix = np.asarray(block_diag(*sections), dtype=np.float64)
         begin = 0
@@ -49,21 +49,21 @@ class LowPass:
 
     @property
     def input(self) -> Array:
-        """Column b, shape (order,), 1/s."""
+        """Input column b, shape (order,), 1/s."""
         column = np.zeros(self.order)
         column[len(self._sections()[0]) - 1] = self.angular_cutoff
         return column
 
     @property
     def output(self) -> Array:
-        """Row c, shape (order,)."""
+        """Output row c, shape (order,)."""
         row = np.zeros(self.order)
         row[self.order - len(self._sections()[-1])] = 1.0
         return row
 
     @property
     def steady_state(self) -> Array:
-        """States at rest under a unit input, -F^-1 b, shape (order,)."""
+        """Steady state for a constant input of 1, -F^-1 b, shape (order,)."""
         return np.concatenate([np.eye(len(section))[0] for section in self._sections()])
 
     def power(self, frequency: ArrayLike) -> Array:

@@ -33,8 +33,8 @@ class NoiseModel:
     N : float
         White noise density, rad/s/sqrt(Hz) or m/s^2/sqrt(Hz).
     B, T_B : float
-        Bias instability, rad/s or m/s^2. With a correlation time, s, it is the Gauss-Markov
-        process of the papers; without one it is flicker noise, as IEEE Std 952 has it.
+        Bias instability, rad/s or m/s^2. With a correlation time T_B, s, it is the Gauss-Markov
+        process of Maia et al.; without T_B it is flicker noise, as in IEEE Std 952.
     K : float
         Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s).
     R : float
@@ -47,8 +47,8 @@ class NoiseModel:
     Raises
     ------
     ValueError
-        If a parameter is negative (R apart) or not finite, T_B is not above 0, or a further term
-        has a parameter above.
+        If a parameter is negative (except R) or not finite, T_B is not above 0, or a further term
+        is of a kind that has a parameter above.
     """
 
     Q: float = 0.0
@@ -67,7 +67,10 @@ class NoiseModel:
             PARAMETERS["T_B"].check(self.T_B)
         for term in self.further:
             if isinstance(term, _KINDS_WITH_PARAMETER):
-                raise ValueError(f"{term} is no further term, state it in its own parameter")
+                raise ValueError(
+                    f"{term} cannot be in 'further': NoiseModel has its own parameter for it; use "
+                    "that"
+                )
         for term in (*self.further, *self.sinusoids):
             for parameter in term.parameters:
                 parameter.check(getattr(term, parameter.symbol))
@@ -97,16 +100,16 @@ class NoiseModel:
 
     @property
     def further_processes(self) -> list[GaussMarkov]:
-        """The further terms as Gauss-Markov processes; raises ValueError if one is none."""
+        """The further terms, as Gauss-Markov processes; ValueError if one is of another kind."""
         processes = []
         for term in self.further:
             if term.gauss_markov is None:
-                raise ValueError(f"{term} is no Gauss-Markov process")
+                raise ValueError(f"{term} is in 'further'; expected only Gauss-Markov processes")
             processes.append(term.gauss_markov)
         return processes
 
     def scaled(self, factor: float) -> "NoiseModel":
-        """Return the model of a signal that is a factor larger; times do not change."""
+        """Return the model of the signal multiplied by a factor; times do not change."""
         return replace(
             self,
             **{name: getattr(self, name) * factor for name in ("Q", "N", "B", "K", "R")},
@@ -117,8 +120,8 @@ class NoiseModel:
     def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
         """Return the two-sided power spectral density at frequencies in Hz, in squared SI units/Hz.
 
-        Lines have none. Only quantization noise depends on the rate, Hz. Raises ValueError if there
-        is quantization noise, and no rate.
+        Lines have no density. Only quantization noise depends on the rate, Hz. Raises ValueError if
+        there is quantization noise, and no rate.
         """
         f = np.asarray(frequency, dtype=np.float64)
         interval = None if rate is None else 1.0 / rate
@@ -127,9 +130,8 @@ class NoiseModel:
     def allan_variance(self, tau: ArrayLike, rate: float | None = None) -> Array:
         """Return the Allan variance at tau in s, (rad/s)² or (m/s²)².
 
-        With a rate, Hz, it is the exact result for the process sampled at this rate. Raises
-        ValueError if a rate is given and a cluster has no sample: it is rounded to the nearest
-        number.
+        With a rate, Hz, it is exact for the process sampled at this rate, and the number of samples
+        in a cluster is rounded. Raises ValueError if a cluster then has no sample.
         """
         t = np.asarray(tau, dtype=np.float64)
         if rate is None:
@@ -138,21 +140,22 @@ class NoiseModel:
             n = np.rint(t * rate)
             if (n < 1.0).any():
                 raise ValueError(
-                    f"a cluster of {t.min():g} s holds no sample at {rate:g} Hz, expected one"
+                    f"a cluster of {t.min():g} s has no sample at {rate:g} Hz; expected a tau of "
+                    f"{1.0 / rate:g} s or more"
                 )
             parts = [term.sampled_allan_variance(n, 1.0 / rate) for term in self.terms]
         return _sum(parts, t)
 
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
-        """Return the spectrum of the samples at angular frequencies in rad a sample, SI^2.
+        """Return the spectrum of the samples at angular frequencies in rad per sample, SI^2.
 
-        The mean is left out: ramps and lines have none.
+        Ramps and lines are left out.
         """
         w = np.asarray(omega, dtype=np.float64)
         return _sum([term.sampled_spectrum(w, 1.0 / rate) for term in self.terms], w)
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return terms with finite state spaces: flicker noise is a bank up to ``longest``, s."""
+        """Return the terms, with flicker noise as Gauss-Markov processes up to ``longest``, s."""
         return [part for term in self.terms for part in term.realised(interval, longest)]
 
     def state_space(self, rate: float, longest: float = _MAX_FLICKER_TAU) -> StateSpace:

@@ -29,8 +29,8 @@ _MIN_BLOCKS_IN_CLUSTER = 16  # for shorter clusters the covariance is used
 def channel_rng(seed: int, *names: str) -> np.random.Generator:
     """Return the random generator of a channel, which depends on the seed and the names only.
 
-    For a simulated log these are its names. For results from a log they are texts that depend on
-    its samples (such as ``repr`` of a model), so that copies of a log have the same limits.
+    The names of a simulated log identify its channel. For results from a log they are texts that
+    depend on its samples (such as ``repr`` of a model), so that copies of a log have equal limits.
     """
     digest = hashlib.sha256("/".join(names).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
@@ -111,7 +111,7 @@ def _add_states(
 def reconstructed_variance(
     model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64], rng: np.random.Generator
 ) -> Array:
-    """Return the Allan variance of one full-length simulated log, shape (m,)."""
+    """Return the Allan variance of one full-length simulated log, shape (m,) (see `ensemble`)."""
     phase = integrate(simulate_blocks(model, rate, samples, rng), samples, holes=False)
     return of_phase(phase, rate, sizes).variance
 
@@ -177,7 +177,7 @@ def _sum_variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
 def block_sums(
     model: NoiseModel, rate: float, blocks: int, width: int, rng: np.random.Generator
 ) -> Array:
-    """Return the sums over adjacent blocks of ``width`` samples of a simulated log, exactly."""
+    """Draw the sums of a log over blocks of ``width`` samples, exact in distribution, (blocks,)."""
     interval = 1.0 / rate
     sums = np.zeros(blocks)
     for term in model.realised(interval, max(blocks * width, 2) * interval):

@@ -40,11 +40,11 @@ def compute_degrees_of_freedom(
 ) -> tuple[Array, Array]:
     """Return the degrees of freedom of the Allan variances of a Gaussian log of a noise model.
 
-    They are for the chi-squared variate with the same relative variance, and for the one with the
-    same lower tail, which gives the upper limit; both of shape (m,).
+    The first belong to the chi-squared variate with the same relative variance, the second to the
+    variate with the same lower tail, for the upper limit; both have shape (m,).
 
     ``sizes``, shape (m,), are n of each tau; no difference spans two segments. If samples are
-    missing, ``presence`` says which, and ``share``, shape (m,), is the share of the differences
+    missing, ``presence`` counts the others, and ``share``, (m,), is the share of the differences
     that is not lost. The ramp and the lines of the model add to the Allan variance, but are not
     noise. (C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
     differences", PTTI 2003, for power laws; W. Satterthwaite, Biometrics Bulletin 2, 1946.)
@@ -67,7 +67,6 @@ def _find_degrees(
     presence: Presence | None,
     share: float,
 ) -> tuple[float, float]:
-    """Return both degrees of freedom at a cluster size."""
     terms = np.array([stop - start - 2 * n + 1 for start, stop in spans])
     terms = terms[terms > 0]
     if not len(terms) or not share > 0:

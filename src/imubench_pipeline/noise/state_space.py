@@ -57,7 +57,7 @@ class StateSpace:
         )
 
     def of_either_sign(self) -> "StateSpace":
-        """Return the model with the mean of the first state replaced by its square as variance."""
+        """Return the model with an initial mean of 0, and its square added to the variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
         mean, variance = np.zeros_like(self.initial_mean), self.initial_variance + squares
         return replace(self, initial_mean=mean, initial_variance=variance)
@@ -82,7 +82,7 @@ def _build_block_diagonal(parts: Sequence[Array]) -> Array:
 
 
 def factor_covariance(covariance: Array) -> Array:
-    """Return the lower triangular root of a covariance (m, m); rows of zeros without variance."""
+    """Return the Cholesky factor of a covariance, (m, m); zeros for states without variance."""
     if len(covariance) == 1:  # frequent: most terms, for each log of an ensemble
         return np.sqrt(covariance)
     varying = np.flatnonzero(np.diag(covariance))
@@ -108,7 +108,8 @@ def draw_block_sums(
 ) -> Array:
     """Draw the sums over blocks of ``width`` samples, exactly, shape (blocks,).
 
-    The space has one state, which is the output, and no measurement noise; ``start`` is the first.
+    The space has one state, which is the output, and no measurement noise; ``start`` is the
+    first state, shape (1,).
     """
     step = _propagate_block(float(space.transition[0, 0]), float(space.process_noise[0, 0]), width)
     normal = rng.standard_normal((2, blocks))

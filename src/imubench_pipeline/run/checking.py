@@ -55,7 +55,7 @@ def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
 def findings_of_channel(
     channel: str, log: ChannelLog, bandwidth: float | None, settings: AllanSettings
 ) -> list[Finding]:
-    """Return findings on drifts, steps, lines and the end of the band; `bandwidth` in Hz."""
+    """Return findings on drift, steps, spectral lines and the band limit; `bandwidth` in Hz."""
     if log.holes and not len(compute_channel_curve(log, settings).tau):
         return [report_too_sparse(channel, log)]
     highest = 0.5 * bandwidth if bandwidth else None

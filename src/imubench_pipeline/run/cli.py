@@ -94,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"imubench {options.command}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
-        # Who reads has seen enough, as `head` has.
+        # The reader of the pipe closed it, as `head` does.
         _close_terminal()
         return _CLOSED_PIPE
     except OSError as error:

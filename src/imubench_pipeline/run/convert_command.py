@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the converted figure with its relation; return the exit status."""
+    """Print the converted figure and the formula of the conversion; return the exit status."""
     from imubench_pipeline.words.numbers import number_text
 
     value, relation = convert_figure(
@@ -56,10 +56,10 @@ def convert_figure(
     horizon: str | None = None,
     sensitivity: str | None = None,
 ) -> tuple[float, str]:
-    """Return a figure in another unit, and the relation that was used, in words.
+    """Return a figure in the unit ``to``, and a text with the formula of the conversion, if any.
 
-    ``figure`` has its unit; ``rate``, ``horizon`` and ``sensitivity`` are quantities as
-    `imubench convert` takes them. Raises a `UnitError` for units that do not belong together.
+    ``figure`` includes its unit; ``rate``, ``horizon`` and ``sensitivity`` are texts such as
+    "100 Hz", "1 h" and "131 LSB/(deg/s)". Raises a `UnitError` if the units do not match.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def convert_figure(
     number, unit = units.split_quantity(figure)
     if one_sided:
         if not any(_is_a(unit, f"{sensor}_density") for sensor in _SIGNALS):
-            raise units.UnitError(f"{unit!r} is no density, so --one-sided does not apply")
+            raise units.UnitError(f"--one-sided: {unit!r} is no density; omit the option")
         value = units.convert(number, unit, to) / math.sqrt(2.0)
         return value, " (N: one-sided density / sqrt(2))"
     if rate is not None:
@@ -87,7 +87,8 @@ def convert_figure(
                 per_si = units.find_conversion(scale_unit, f"{sensor}_sensitivity")[0] * scale
                 return units.convert_from_si(number / per_si, to, signal), f" (at {sensitivity})"
         raise units.UnitError(
-            "expected a figure in LSB and a sensitivity such as '131 LSB/(deg/s)'"
+            f"--sensitivity: found a figure in {unit!r} and a sensitivity in {scale_unit!r}; "
+            "expected a figure in LSB, and a sensitivity such as '131 LSB/(deg/s)'"
         )
     else:
         return float(units.convert(number, unit, to)), ""
@@ -95,7 +96,7 @@ def convert_figure(
         if _is_a(unit, signal):
             si = units.find_conversion(unit, signal)[0] * number
             return units.convert_from_si(factor * si, to, f"{sensor}_{result}"), relation
-    raise units.UnitError(f"{unit!r} does not belong to {option}; expected such as deg/s or mg")
+    raise units.UnitError(f"{option}: found the unit {unit!r}; expected one such as deg/s or mg")
 
 
 def _is_a(unit: str, dimension: str) -> bool:

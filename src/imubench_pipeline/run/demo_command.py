@@ -105,7 +105,7 @@ def analyse_real_log(log: RealLog, file: Path, folder: Path) -> int:
     if found != log.size or compute_digest(file) != log.digest:
         raise ConfigError(
             f"{file}: found {found} bytes that are not {log.file}; expected {log.size} bytes with "
-            f"SHA-256 {log.digest}: download it by {log.command}"
+            f"SHA-256 {log.digest}: download the file with {log.command}"
         )
     with tempfile.TemporaryDirectory(prefix="imubench.") as scratch:
         with tarfile.open(file) as archive:

@@ -22,8 +22,8 @@ _FAULT_FOLDER = "faults"
 class Faults:
     """The records of the steps that failed, in the folder ``faults`` of the results.
 
-    They have the number of attempts of each step. A step that failed is tried again, and an ingest
-    whose samples were changed: these are no declared outputs, since their files depend on the log.
+    Each record has the number of attempts. The next run repeats failed steps, and ingests whose
+    samples were changed: samples are no declared outputs, since their files depend on the log.
     """
 
     def __init__(self, results: Path) -> None:
@@ -34,16 +34,16 @@ class Faults:
         self._lost: dict[Of, bool] = {}
 
     def attempt(self, of: Of, *, again: bool = True) -> int:
-        """Return the number of the attempt of this run; 0 if no attempt ever failed.
+        """Return the number of this run's attempt at a step; 0 if no attempt failed before.
 
-        Without `again` a step that failed is not tried again.
+        Without `again`, the step is not repeated: the number is the one of the last attempt.
         """
         record = self._before.get(of)
         tried, failed = (record.attempt, record.failed) if record else (0, False)
         return tried + (again and (failed or self._has_lost_samples(of)))
 
     def repeated(self, recordings: Iterable[tuple[str, str]]) -> set[tuple[str, str | None]]:
-        """Return the sensors and recordings with a step that is tried again."""
+        """Return sensor and recording (None: whole sensor) of the steps that are repeated."""
         lost: set[tuple[str, str | None]] = {
             key for key in recordings if self._has_lost_samples(("ingest", *key))
         }
@@ -83,14 +83,14 @@ class Faults:
             write_sealed_json({"attempt": attempt, "failed": False, **about}, path)
 
     def now(self) -> Iterator[tuple[Failure, Path]]:
-        """Yield the failures of this run with their logs."""
+        """Yield the failures of this run, each with the path of the log file of its step."""
         for of, record in self._records():
             if record.failed and record.attempt >= self.attempt(of):
                 step, sensor, recording = of
                 yield Failure(sensor, recording, step, record.cause, record.reason), record.log
 
     def left_out(self) -> str:
-        """Return the message about failures of a run; empty if its caller reports them (`TOLD`)."""
+        """Return a message about the failures of this run; empty without any, or with `TOLD`."""
         lines = [
             "failed parts are omitted, and tried again by the next run; the report is complete "
             "otherwise"
@@ -104,7 +104,7 @@ class Faults:
 
     def _records(self) -> "Iterator[tuple[Of, _Record]]":
         for path in sorted(self._folder.glob("*/**/*.json")):
-            with contextlib.suppress(OSError, ValueError):  # one that was cut off
+            with contextlib.suppress(OSError, ValueError):  # not completely written
                 record = _Record.model_validate(read_sealed_json(path))
                 yield (record.step, record.sensor, record.recording), record
 

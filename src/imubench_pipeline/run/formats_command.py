@@ -20,7 +20,7 @@ def run(_: argparse.Namespace) -> int:
 
 
 def list_log_formats() -> Listing:
-    """Return a line per format of log files."""
+    """Return the title and the lines of the table of log formats."""
     # Only this command needs these: the others answer at once.
     from imubench_pipeline.readers.formats import FILE_FORMATS
 

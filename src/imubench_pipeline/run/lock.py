@@ -28,16 +28,15 @@ class TakenError(RuntimeError):
 
 
 def locate_lock(results: Path) -> Path:
-    """Return the file of the lock on a folder of results."""
+    """Return the path of the lock file of a folder of results."""
     return results / "nightly/lock"
 
 
 class Lock(AbstractContextManager["Lock"]):
     """A lock on a folder of results, which the system releases if the process is killed.
 
-    All processes with an open ``descriptor`` hold it, such as Snakemake, which inherits it. While
-    it is held, its file has a note about the holder; a note in a free lock is of a run without an
-    end.
+    Each process that has ``descriptor`` open holds the lock; Snakemake inherits it. The file has a
+    note about the holder; in the file of a free lock, it is from a run that was killed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -73,8 +72,8 @@ class Lock(AbstractContextManager["Lock"]):
     def acquire_unless_inherited(self) -> None:
         """Acquire the lock, unless this process inherited it; raise `TakenError` if it is taken.
 
-        A note of an earlier run stays only after a restart: `imubench nightly` then checks its
-        files.
+        The note of a killed run stays only if the machine was restarted after it: `imubench
+        nightly` then checks the files of that run.
         """
         if self.descriptor >= 0:
             return
@@ -87,7 +86,7 @@ class Lock(AbstractContextManager["Lock"]):
             self.left_over = {}
 
     def note(self, **more: object) -> None:
-        """Write the holder of the lock, and further data for a later run, to its file."""
+        """Write a note about the holder, and ``more`` data for a later run, to the lock file."""
         program = Path(sys.argv[0])
         name = program.parent.name if program.name == "__main__.py" else program.name
         about = {

@@ -10,9 +10,9 @@ _INTERVAL = 3.0  # s, between two lines where there is no terminal
 
 @contextmanager
 def show_progress(size: int, done: str) -> Iterator[Callable[[int], None]]:
-    """Give a callback for more of ``size``, which shows the share: a bar, or lines in a file.
+    """Show the progress of work; yield a function to call with each finished amount of ``size``.
 
-    ``done``: what follows the share in a line, such as ``simulated``.
+    A terminal shows a bar, a file gets lines: the percentage, then ``done``, such as ``simulated``.
     """
     if sys.stderr.isatty():
         from rich.console import Console

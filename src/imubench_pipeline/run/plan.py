@@ -60,11 +60,11 @@ _BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")  # inside a text of JSON: others
 
 
 class Plan:
-    """The plan of a run.
+    """The recordings of a run, and the settings of each step, from the configuration.
 
     A ConfigError is raised if the configuration or the list of simulated recordings cannot be used,
-    or a log would make the same recording as one of these. ``stored``: the logs are in an object
-    store, and their dates there decide whether they are read again.
+    or if a log has the name of a simulated recording. ``stored``: the logs are in an object store,
+    and their dates there determine whether they are read again.
     """
 
     def __init__(self, config: Mapping[str, object], *, stored: bool = False) -> None:
@@ -124,15 +124,15 @@ class Plan:
         if not self.run.logs.is_dir():
             if self.run.to_simulate is None:
                 raise ConfigError(
-                    f"logs: found {str(self.run.logs)!r}, which is no folder; expected the folder "
-                    "that holds <sensor>/<recording>"
+                    f"logs: found {str(self.run.logs)!r}, which is no folder; expected a folder "
+                    "with the logs as <sensor>/<recording>"
                 )
             return []
         by_name: dict[str, list[Recording]] = {}
         results = self.run.results.resolve()
         for log in find_logs(self.run.logs):
             if log.path.is_symlink() and Path(os.path.realpath(log.path)).is_relative_to(results):
-                log = replace(log, error=f"{log.path.name} links to the results of runs: remove it")
+                log = replace(log, error=f"{log.path.name} links to the results of runs; remove it")
             by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
         for key in self.run.held_back:
             found = by_name.get(key, [])
@@ -154,18 +154,18 @@ class Plan:
         return [Recording(sensor, name, path, readable, simulated=False, held_back=True)]
 
     def files(self) -> str:
-        """Return every file in the drop zone, with its recording or the reason to skip it."""
+        """Return, as JSON, every file in the drop zone, with its recording or why it is skipped."""
         found = [log for log in self.recordings.values() if not log.simulated]
         files = account_for(self.run.logs, found, self._still_written)
         return to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
-        """Return the attempt of a step (`Faults.attempt`), the last one if it is held back."""
+        """Return the number of the attempt at a step (`Faults.attempt`); if postponed, the last."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
     def repeated_jobs(self) -> list[dict[str, str]]:
-        """Return sensor and recording of the steps that are tried again."""
+        """Return the wildcards (sensor, perhaps recording) of the steps that are repeated."""
         ready = [key for key, log in self.recordings.items() if not log.held_back]
         return [
             {"sensor": sensor} | ({"recording": name} if name else {})
@@ -175,7 +175,7 @@ class Plan:
     def list_ingests_without_samples(
         self, jobs: Iterable[Mapping[str, str]]
     ) -> dict[str, Mapping[str, str]]:
-        """Return the ingests of jobs whose samples were removed, by the place of their seals."""
+        """Return the jobs with removed samples, by the name of the seal of their ingest."""
         again = {}
         for job in jobs:
             key = (job.get("sensor", ""), job.get("recording", ""))
@@ -187,7 +187,7 @@ class Plan:
         return again
 
     def ingest_settings(self, sensor: str, name: str) -> str:
-        """Return the settings of the ingest of a recording, or its error if it cannot be read."""
+        """Return, as JSON, the ingest settings of a recording, or why it cannot be read."""
         if (sensor, name) not in self._of_ingest:
             self._of_ingest[sensor, name] = to_json(
                 self._ingest(self.recordings[sensor, name]).to_json()
@@ -249,7 +249,7 @@ class Plan:
         return self._read_notes[recording.notes]
 
     def of_experiment(self, *keys: str) -> list[tuple[str, str]]:
-        """Return sensor and name of the recordings with one of these experiments."""
+        """Return sensor and name of the recordings whose notes have one of these keys."""
         return [key for key in self.recordings if self._experiment(*key) in keys]
 
     def _experiment(self, sensor: str, name: str) -> str | None:
@@ -284,7 +284,7 @@ class Plan:
         return by_sensor
 
     def experiment_settings(self, sensor: str, name: str, *sections: str) -> str:
-        """Return sections of the configuration, the sensor, and what is stated of a recording."""
+        """Return, as JSON, sections of the configuration, the sensor, and a recording's notes."""
         recording = self.recordings[sensor, name]
         declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
@@ -326,7 +326,7 @@ class Plan:
         ), notes
 
     def estimate_settings(self, sensor: str, name: str) -> str:
-        """Return the settings of the estimates of a recording."""
+        """Return, as JSON, the settings that the estimates of a recording depend on."""
         bandwidth = self.bandwidth(sensor, name)
         settings: dict[str, object] = {"estimate": self.run.estimate, "bandwidth": bandwidth}
         if (sensor, name) in self.simulated:
@@ -336,7 +336,7 @@ class Plan:
         return to_json(settings)
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
-        """Return the stated cut-off of the sensor's own filter, Hz."""
+        """Return the stated cut-off of the sensor's filter, Hz; None if it is not stated."""
         try:
             stated = self._written(self.recordings[sensor, name])[0].bandwidth
         except ConfigError:
@@ -344,7 +344,7 @@ class Plan:
         return parse_quantity(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
-        """Return the parameters and the log format of a simulated recording."""
+        """Return, as JSON, the parameters and the log format of a simulated recording."""
         recording = self.simulated[sensor, name]
         written = simulations.layout(recording, self.sensors[sensor].log)
         try:
@@ -354,7 +354,7 @@ class Plan:
         except OSError as error:
             raise ConfigError(
                 f"{sensor}/{name}: {error.filename} cannot be read "
-                f"({error.strerror}); expected the file of a profile of temperature or motion"
+                f"({error.strerror}); expected a file with a profile of temperature or motion"
             ) from None
         return to_json(
             {
@@ -365,11 +365,11 @@ class Plan:
         )
 
     def settings(self, section: str) -> str:
-        """Return one section of the run's configuration."""
+        """Return, as JSON, one section of the run's configuration."""
         return to_json(getattr(self.run, section))
 
     def datasheet_settings(self, sensor: str) -> str:
-        """Return the settings of the comparison with the datasheet of a sensor."""
+        """Return, as JSON, the settings of the comparison of a sensor with its datasheet."""
         declared = self.sensors.get(sensor)
         return to_json(
             {
@@ -380,7 +380,7 @@ class Plan:
         )
 
     def error_budget_settings(self, sensor: str) -> str:
-        """Return the settings of the error budget of a sensor, with its printed figures."""
+        """Return, as JSON, the settings of a sensor's error budget, with its printed figures."""
         if sensor not in self._of_error_budget:
             self._of_error_budget[sensor] = to_json(
                 {
@@ -393,7 +393,7 @@ class Plan:
         return self._of_error_budget[sensor]
 
     def ranking_settings(self) -> str:
-        """Return the settings of the ranking: requirements, and sensors that are for sale."""
+        """Return, as JSON, the settings of the ranking: requirements, and sensors for sale."""
         sensors = self._for_sale()
         requirements = self._requirements(*_REPORT_KEYS)
         return to_json({"requirements": requirements, "sensors": sensors})
@@ -421,7 +421,7 @@ class Plan:
         }
 
     def report_settings(self) -> str:
-        """Return the settings of the report."""
+        """Return, as JSON, the settings of the report."""
         return to_json(
             {
                 "report": self.run.report,
@@ -458,13 +458,13 @@ class Plan:
         return table in BY_RECORDING and len(self.recordings) > self.run.tables.parts_above
 
     def remove_unused_csv(self) -> None:
-        """Remove the joint tables as CSV of an earlier run that the settings now leave out."""
+        """Remove CSV files of joint tables that an earlier run wrote and the settings now omit."""
         for path in (self.run.results / "tables").glob("*.csv"):
             if path.stem in TABLES and not self.writes_csv(path.stem):
                 path.unlink(missing_ok=True)
 
     def catalogue(self, *more: str, sensor: str | None = None) -> str:
-        """Return the datasheets of all sensors or one, with vendor, model, grade, and more keys."""
+        """Return, as JSON, the datasheets of all sensors or one, with vendor and ``more`` keys."""
         names = self.sensors if sensor is None else {sensor} & self.sensors.keys()
         keys = {"vendor", "model", "grade", "temperature_range", "datasheet", *more}
         return to_json(
@@ -477,16 +477,16 @@ class Plan:
 
     @cached_property
     def usual(self) -> str:
-        """Usual figures of sensors, from the catalogue of the package, which no user edits."""
+        """Usual figures of sensors, as JSON, from the catalogue that the package ships."""
         return usual_as_text(usual_figures(sensor_files.shipped_sensors()))
 
     def truths(self, sensor: str) -> str:
-        """Return the true parameters of the simulated recordings of a sensor."""
+        """Return, as JSON, the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
         return to_json([*map(_dump_for_tables, entries)])
 
     def describe_software(self) -> str:
-        """Return the version of the program, and a digest of all settings that affect results."""
+        """Return, as JSON, the program's version, and a digest of settings that affect results."""
         ignored = {"logs", "results", "sensors", "requirements", "simulated", "held_back"}
         used = {sensor for sensor, _ in self.recordings} & self.sensors.keys()
         settings = [
@@ -503,7 +503,7 @@ class Plan:
 
     @staticmethod
     def code(step: str, package: str = "steps") -> str:
-        """Return the digest of the code of a step, which is the module of its name in a package."""
+        """Return a digest of the module ``step`` in a package, and of all code that it uses."""
         return digest_sources(f"{package}.{step}")
 
 
@@ -542,13 +542,13 @@ def _check_places(run: Run) -> None:
         )
     if logs.is_relative_to(results) or results.is_relative_to(logs):
         raise ConfigError(
-            f"logs: found {str(run.logs)!r}, and results: {str(run.results)!r}; expected two "
-            "folders, neither of them in the other: name another one for the results"
+            f"logs: found {str(run.logs)!r}, and results: found {str(run.results)!r}; expected two "
+            "folders, neither inside the other: choose another folder for the results"
         )
 
 
 def to_json(value: object) -> str:
-    """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
+    """Return a value as JSON, without braces that Snakemake would read as a wildcard."""
     dump = partial(BaseModel.model_dump, mode="json")
     text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=dump)
     return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)

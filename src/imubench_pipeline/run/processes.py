@@ -26,8 +26,8 @@ _MAX_KILL_TIME = 60.0  # max. time for the system to end a step, s.
 class StepError(Exception):
     """Raised if a script of the workflow did not finish.
 
-    ``cause`` is None if it is not the recording: the run was stopped, the disk is full, or the
-    script cannot be imported. ``reason`` is one line, ``trace`` the traceback in the script.
+    ``cause`` is None if the recording is not the cause: the run was stopped, the disk is full, or
+    the script cannot be imported. ``reason`` is one line, ``trace`` the traceback in the script.
     """
 
     def __init__(self, text: str, cause: Cause | None = None, reason: str = "") -> None:
@@ -37,7 +37,7 @@ class StepError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A script with its attributes of ``snakemake``, which are pickled."""
+    """A script to run, with the attributes of the object ``snakemake`` for it; all are pickled."""
 
     script: Path
     input: Any
@@ -58,8 +58,8 @@ class Job:
 class Processes:
     """Runs scripts in forks of one process, which starts with the first script.
 
-    It ends with the process of this object, even if that is killed; on Linux the forks end, too,
-    and each has the name of its script. A fork does not depend on the forking process.
+    The forking process ends with the process of this object, even if that is killed. On Linux the
+    forks end, too, and each has the name of its script. A fork goes on if the forking process ends.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class Processes:
         atexit.register(self.close)
 
     def run(self, job: Job, seconds: float | None = None) -> None:
-        """Run a script to its end; `StepError` if it fails or exceeds `seconds` without imports."""
+        """Run a script; `StepError` if it fails or takes over `seconds`, imports not counted."""
         ours, theirs = Pipe()
         with ours:
             with theirs:

@@ -1,7 +1,7 @@
 """Show the progress of a run, a line for each finished recording, and errors.
 
 This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`): ``logger: imubench`` of a
-profile. All that Snakemake says itself is in its log file, which is named at the end.
+profile. The messages of Snakemake are in its log file; the path is printed at the end.
 """
 
 import logging
@@ -42,7 +42,7 @@ _describe_end: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], describe: Callable[[str, str], str]) -> None:
-    """Show what `describe` returns for a recording when the last of its `jobs` has ended."""
+    """Print `describe(sensor, name)` after the last job of a recording; `jobs`: one entry a job."""
     _expected.clear()
     _expected.update(jobs)
     _describe_end[:] = [describe]
@@ -79,7 +79,7 @@ class LogHandler(LogHandlerBase):
         self._done, self._total = 0, 0
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a record."""
+        """Print a log record of Snakemake, or update the line of progress."""
         if self._whole is not None:
             self._whole.setFormatter(self.formatter)
             self._whole.emit(record)
@@ -121,7 +121,7 @@ class LogHandler(LogHandlerBase):
             self._end_job(about.get("jobid"))
 
     def close(self) -> None:
-        """Take the line away."""
+        """Remove the line of progress."""
         self._running.clear()
         self._hide()
         super().close()

@@ -25,12 +25,12 @@ _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproje
 
 
 def find_protected_places(path: Path, results: Path | None = None) -> Iterator[Place]:
-    """Yield the protected places that may contain an absolute path without links, or be inside it.
+    """Yield the protected places that can contain a path, or lie inside it.
 
-    These are the configuration of the package, and the ``config/``, logs, results, sensors,
-    requirements and workflow of each project: a folder with ``config/config.yaml`` that is the
-    working folder, or lies at or above the path or `results`. In folders of results, only the
-    folders that runs write and the logs that the report names are protected.
+    The path is absolute, with links resolved. Protected are the configuration of the package, and
+    ``config/``, logs, results, sensors, requirements and workflow of each project. A project is a
+    folder with ``config/config.yaml``: the working folder, the path, or a folder above the path or
+    `results`. Of results, only folders that runs write, and logs that reports name, are protected.
     """
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]
@@ -67,25 +67,25 @@ def has_results(folder: Path) -> bool:
 
 
 def find_own_snakefile(folder: Path) -> Path | None:
-    """Return the workflow of a folder, which `snakemake` finds there; None if it has none."""
+    """Return the Snakefile that `snakemake` finds in a folder; None if there is none."""
     places = (folder / "Snakefile", folder / "workflow/Snakefile")
     return next((place for place in places if place.is_file()), None)
 
 
 def find_snakefile(folder: Path) -> Path:
-    """Return the Snakefile of a checkout, or for a folder of logs the package's; or ConfigError."""
+    """Return a checkout's Snakefile, or the package's for a folder of logs; else ConfigError."""
     if own := find_own_snakefile(folder):
         return own.absolute()
     shipped = find_project() / "Snakefile"
     if not (folder / "config/config.yaml").is_file():
         raise ConfigError(
-            f"{folder}: found no config/config.yaml and no Snakefile; expected a folder of logs, "
-            f"which imubench init {folder} makes, or a checkout"
+            f"{folder}: found no config/config.yaml and no Snakefile; expected a checkout, or a "
+            f"folder of logs: make one with imubench init {folder}"
         )
     if not shipped.is_file():
         raise ConfigError(
-            f"{shipped}: no such file; expected the workflow in the installed package: install it "
-            "again, from a wheel or a checkout"
+            f"{shipped}: no such file; expected the workflow in the installed package: install the "
+            "package again, from a wheel or a checkout"
         )
     return shipped
 
@@ -94,7 +94,7 @@ _DEMONSTRATION = ("config/simulated.yaml", "config/boards")
 
 
 def add_init_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what `imubench init` is given."""
+    """Add the arguments of `imubench init` to its parser."""
     parser.description = (
         "Make a folder of logs: config/config.yaml with all settings, an example of a sensor file, "
         "and a README that says how to go on. Nothing that is there is written over."
@@ -113,7 +113,7 @@ def add_init_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def init(options: argparse.Namespace) -> int:
-    """Make the folder; return the exit status."""
+    """Make a folder of logs, with settings, an example and a README; return the exit status."""
     output: OutputFolder = options.folder
     folder = output.path
     shipped, own = find_project(), Path(__file__).with_name("lab")
@@ -128,13 +128,13 @@ def init(options: argparse.Namespace) -> int:
             files[path.relative_to(shipped).as_posix()] = path
     if there := [name for name in files if (folder / name).exists()]:
         raise ConfigError(
-            f"{folder / there[0]}: exists already; expected a folder without it: choose "
-            "another one, or rename that file"
+            f"{folder / there[0]} exists already; choose a folder without this file, or rename "
+            "the file"
         )
     absolute = folder.resolve()
     if results := next((one for one in [absolute, *absolute.parents] if has_results(one)), None):
         raise ConfigError(
-            f"{folder}: lies in the results of runs ({results}); expected a folder outside of them"
+            f"{folder} is inside the results of runs ({results}); choose a folder outside"
         )
     for made in ("logs", "config/sensors"):
         (folder / made).mkdir(parents=True, exist_ok=True)
@@ -146,7 +146,7 @@ def init(options: argparse.Namespace) -> int:
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what `imubench run` is given."""
+    """Add the arguments of `imubench run` to its parser."""
     parser.usage = "%(prog)s [-h] [-c N] [folder] [-- FLAG ...]"
     parser.description = (
         "Run the workflow in a folder that imubench init has made, or in a checkout. Arguments "
@@ -162,7 +162,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Become Snakemake, and pass on its exit status."""
+    """Run the workflow: this process becomes Snakemake, and ends with its exit status."""
     with require_extra("workflow", "run the workflow"):
         import_module("snakemake")
     folder: Path = options.folder

@@ -24,7 +24,7 @@ STILL_WRITTEN = 60.0  # s; a file that changed so shortly before a run may belon
 
 
 def was_restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
-    """Return whether the machine was restarted after a run of this note; `boot`: s since 1970."""
+    """Return whether this machine started (`boot`, s since 1970) after a lock note was written."""
     try:
         since = datetime.fromisoformat(str(note.get("since"))).timestamp()
     except ValueError:
@@ -35,7 +35,7 @@ def was_restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
 
 
 def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
-    """Remove temporary files older than the time of the lock, s; return their number and bytes."""
+    """Remove temporary files older than ``locked``, s since 1970; return their number and bytes."""
     number = size = 0
     for path in list(walk_outputs(results)):
         if not _TEMPORARY_NAME.fullmatch(path.name) or path.is_symlink():
@@ -50,7 +50,7 @@ def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
 
 
 def find_unfinished(results: Path) -> list[Path]:
-    """Return the files and folders below the results that are not complete."""
+    """Return the temporary files and folders in the results, which are incomplete outputs."""
     unfinished = [path for path in walk_outputs(results) if _TEMPORARY_NAME.fullmatch(path.name)]
     return [path for path in unfinished if not any(other in path.parents for other in unfinished)]
 

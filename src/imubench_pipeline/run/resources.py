@@ -29,7 +29,7 @@ _BYTES_PER_VALUE = 7  # of text: nine digits take eleven, small counts three
 
 @dataclass(frozen=True)
 class Limit:
-    """Max. time of a step in s, memory in bytes beside the forking process, and their settings."""
+    """Limits of a step: time in s, the settings of that time, and additional memory in bytes."""
 
     seconds: float
     words: str
@@ -52,7 +52,7 @@ class Extent:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """Cost of a step of one recording, or of many, of one sensor or of all.
+    """Memory and time that a step needs, as linear functions of the size of its data.
 
     Memory in MB, and MB per million samples of a channel and per recording. Time in s, s per
     channel, s per million values of all channels, and s per recording. ``many_jobs``: a group
@@ -69,7 +69,7 @@ class Cost:
     many_jobs: bool = False
 
     def of(self, extent: Extent) -> tuple[float, float]:
-        """Return memory in MB and time in s."""
+        """Return the memory in MB and the time in s for data of a size, the time with a margin."""
         memory = self.memory + self.memory_of_samples * extent.million_samples
         of_channel = self.time_of_channels + self.time_of_values * extent.million_samples
         time = self.time + of_channel * extent.channels + self.time_of_each * extent.recordings
@@ -88,7 +88,7 @@ def compute_resources(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str,
 
 
 def make_resource_functions(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
-    """Return a function from the cost of a rule to its resource functions."""
+    """Return a function that turns the cost of a rule into its resource functions for Snakemake."""
     extent = _make_extent_lookup(plan)
 
     def stated(cost: Cost) -> dict[str, Asked]:
@@ -106,7 +106,7 @@ def make_resource_functions(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
 
 
 def make_step_limits(plan: Plan) -> Limits:
-    """Return the limits of steps of recordings and sensors, from the settings of the plan."""
+    """Return a function that gives the limits of a step from the settings and the data size."""
     extent = _make_extent_lookup(plan)
     limits = plan.run.limits
     seconds = {
@@ -159,7 +159,7 @@ def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
 
 
 def estimate_text_size(path: Path) -> int:
-    """Return the size of a log file as text, bytes; packed samples are estimated. 0: no file."""
+    """Return the estimated size of a log file if it were text, bytes; 0 if there is no file."""
     if not path.is_file():
         return 0
     suffix = path.suffix.lower()

@@ -20,13 +20,13 @@ _SCRIPT_SIGNATURE = signature(script_of_snakemake)
 
 
 class Scripts:
-    """Replacement for the function `script` of Snakemake, which rules with a script call.
+    """Replaces the function `script` of Snakemake, which rules with a script call.
 
     A rule with the parameter ``attempt`` belongs to a recording or a sensor, which is left out if
-    its script fails. A killed script, for example for lack of memory, is run once more. Any script
-    ends the job as usual if it is stopped with the run, the disk is full, or it cannot be imported.
-    Without `limits` (of a step of one recording or sensor) each failure ends the job. Outputs are
-    sealed unless ``sealed`` is False, as in an object store.
+    the script fails. A killed script, for example for lack of memory, is run once more. The job
+    fails as usual if the run is stopped, the disk is full, or the script cannot be imported.
+    Without `limits`, each failure ends the job. Outputs are sealed unless ``sealed`` is False, as
+    in an object store.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None, *, sealed: bool = True) -> None:
@@ -36,7 +36,7 @@ class Scripts:
         self._processes = Processes()
 
     def __call__(self, *values: Any, **named: Any) -> None:
-        """Run a script to its end, or leave its outputs empty; else raise `StepError`."""
+        """Run a script; if its recording or sensor fails, write empty outputs, else `StepError`."""
         given = _SCRIPT_SIGNATURE.bind(*values, **named).arguments
         source = infer_source_file(given["path"], infer_source_file(given["basedir"]))
         if isinstance(source, LocalSourceFile):

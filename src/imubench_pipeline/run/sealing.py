@@ -16,7 +16,7 @@ _MAX_NAMES = 200  # in a pattern: matching more takes longer than the jobs that 
 
 @contextlib.contextmanager
 def seal_outputs(job: Job) -> Iterator[None]:
-    """Seal outputs and inputs of a job when the block ends without error, if it has ``results``."""
+    """Seal a job's outputs and inputs after the block, unless this fails, or results is None."""
     if job.results is None:
         yield
         return
@@ -42,12 +42,12 @@ def digest_settings(params: Mapping[str, object]) -> str:
 
 
 def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
-    """Yield the jobs whose outputs are not of the present inputs and settings, by their places.
+    """Yield the jobs whose outputs do not match the present inputs and settings.
 
-    Outputs are missing or changed, have no seal, are of another form, or were made of other files
-    or settings. The records of Snakemake are not used: results may come from a backup, or from
-    another machine. A file with unchanged size and date is not read. `jobs` has the
-    `digest_settings` of each.
+    Outputs are missing or changed, have no seal or another form, or were made from other files or
+    settings. The records of Snakemake are not used: results may come from a backup, or from
+    another machine. A file with unchanged size and date is not read. `jobs` maps the name of each
+    seal to `digest_settings`; the names are yielded.
     """
     seals: dict[str, sealed.Seal] = {}
     for place in jobs:
@@ -66,9 +66,9 @@ def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
 
 
 def limit_wildcards(pattern: str, jobs: Sequence[Mapping[str, str]]) -> str:
-    """Return a pattern of outputs whose wildcards match the sensors and recordings of jobs only.
+    """Restrict the wildcards in a pattern of outputs to the sensors and recordings of jobs.
 
-    Wildcards of more than 200 names stay as they are.
+    A wildcard with more than 200 names is not restricted.
     """
     for key in ("sensor", "recording"):
         names = sorted({of[key] for of in jobs if key in of})

@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
         "holes": dict.fromkeys(columns, False),
         "unusable": [],
     } | {"simulation": about}
-    # A name of its own in the stream: the same seed gives every sensor its own noise.
+    # The name is a part of the random stream: with one seed, each sensor has different noise.
     blocks = simulate_imu(
         origin.imu,
         rate,
@@ -173,8 +173,8 @@ def _check_depth(out: OutputFile) -> None:
             parts = real.relative_to(logs).parts
             if len(parts) != _LOG_PATH_DEPTH:
                 raise ConfigError(
-                    f"{out}: lies at {'/'.join(parts)} in the drop zone {logs}; expected "
-                    "<sensor>/<recording>, as a recording of its own: name another --out"
+                    f"{out} would be {'/'.join(parts)} in the folder of logs {logs}; expected "
+                    "<sensor>/<recording> in this folder, or a path outside: change --out"
                 )
 
 
@@ -187,7 +187,7 @@ def _declared(name: str, stated: Path | None) -> Any:
     if name not in files:
         raise ConfigError(
             f"{places[-1] / name}.yaml: no such sensor file; there are: "
-            f"{', '.join(files) or 'none'}; or name a file of models"
+            f"{', '.join(files) or 'none'}; or give a YAML file of models"
         )
     return read_settings(Sensor, files[name])
 
@@ -209,7 +209,7 @@ def _origin(options: argparse.Namespace) -> "tuple[Origin, Any]":
     path = Path(options.sensor)
     if path.suffix in _YAML_SUFFIXES:
         if options.results:
-            raise ConfigError("--results are for a sensor by name; the file of models has its own")
+            raise ConfigError(f"--results cannot be used with the file of models {path}: omit them")
         origin = models.read_model_file(path)
         sensor = _declared(origin.sensor, options.sensors) if origin.sensor else None
     else:
@@ -235,7 +235,7 @@ def _rate(text: str | None, log: Any) -> float:
             raise ConfigError(f"--rate {text}: expected a frequency above 0")
         return rate
     if log is None or log.rate_hz is None:
-        raise ConfigError("the sensor file states no rate; expected --rate such as '100 Hz'")
+        raise ConfigError("the sensor file states no rate; add an option such as --rate '100 Hz'")
     return float(log.rate_hz)
 
 
@@ -270,7 +270,7 @@ def _profiles(
             columns = FileSeries(options.motion).names
             names = [name for name in columns if name.startswith(("gyro_", "accel_"))]
             if not names:
-                raise ConfigError(f"{options.motion}: no column gyro_x to accel_z")
+                raise ConfigError(f"{options.motion}: no column such as 'gyro_x [deg/s]'; add one")
             form = {"form": "file", "file": str(options.motion)}
             forms["motion"] = {name: form for name in names}
     motion, _ = profiles_of(parse(Surroundings, forms, str(options.motion)), folder)

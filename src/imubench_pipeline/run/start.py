@@ -7,10 +7,9 @@ import sys
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
 } | {"JE_ARROW_MALLOC_CONF": "background_thread:false"}
-"""The environment of a process that computes with one core, and forks for the others: threads of a
-library that spin for work in each fork take more core time than the work itself, and Python from
-3.12 on warns of each fork of a process that has another thread, as pyarrow starts for an allocator
-that it does not use. NumPy and pyarrow ask for it when they are imported, and never again."""
+"""The environment of a process that computes with one thread, and forks to use more cores: threads
+that wait for work in each fork would take more time than the work, and Python from 3.12 on warns of
+a fork beside a thread of pyarrow. NumPy and pyarrow read it only when they are imported."""
 
 
 def main() -> int:

@@ -34,9 +34,9 @@ from imubench_pipeline.tables.findings import UnavailableError
 def compile_once(locks: IO[bytes]) -> None:
     """Make this process and its forks wait for kernels that another process compiles.
 
-    Else a third of all compilations of a first run are of a kernel that another process compiles.
+    Otherwise, a third of all compilations in a first run would be duplicates.
     `locks`: a file open for writing, never closed, the same for all processes. Each kernel locks
-    the byte of the hash of its name; the system unlocks it when the process ends.
+    one byte, at the hash of its name; the system unlocks it when the process ends.
     """
     load, save = FunctionCache.load_overload, FunctionCache.save_overload
 
@@ -68,8 +68,8 @@ _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork for each job from a socket; its connection gets None, then the cost or `StepError`."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
+    """Fork for each job from a socket; send None at its start, then its cost or a `StepError`."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only forks end by it; this ends with the socket
     signal.signal(signal.SIGCHLD, _reap)
     ready: dict[Path, bool] = {}
     while True:
@@ -80,7 +80,7 @@ def serve(requests: socket.socket) -> None:
             job: Job = connection.recv()
             if job.script not in ready:
                 ready[job.script] = _import_modules_of(job.script)
-            # Until a fork is known, that it has ended must not be heard of.
+            # No SIGCHLD until the fork is in `_running`.
             signal.pthread_sigmask(signal.SIG_BLOCK, _CHILD_SIGNALS)
             fork = os.fork()
             if fork == 0:
@@ -127,9 +127,9 @@ def _import_modules_of(script: Path) -> bool:
         importlib.import_module("pyarrow.dataset")
         _nothing()
     except (Exception, SystemExit):
-        return False  # the fork meets the same error, and says it
+        return False  # the fork raises the same error, and reports it
     gc.collect()
-    gc.freeze()  # what the forks share stays shared
+    gc.freeze()  # so that the forks go on sharing this memory
     return True
 
 
@@ -174,7 +174,7 @@ def _run(connection: "Connection[Any, Any]", job: Job, *, imported: bool) -> Non
         outcome = {"cpu": cpu, "memory": memory}
     except BaseException as error:
         assert isinstance(outcome, StepError)
-        if not isinstance(error, UnavailableError):  # of the surroundings: its text says it all
+        if not isinstance(error, UnavailableError):  # no fault of the code: its text is enough
             outcome.trace = _trace(error, str(job.script))
         outcome.reason = fold_text(describe_error(error), _MAX_ERROR_LENGTH)
         if isinstance(error, MemoryError):
@@ -182,7 +182,7 @@ def _run(connection: "Connection[Any, Any]", job: Job, *, imported: bool) -> Non
         of_results = isinstance(error, OSError) and error.errno in OF_RESULTS
         outcome.cause = "error" if imported and not of_results else None
     finally:
-        with suppress(OSError):  # a disk that is full takes no words either
+        with suppress(OSError):  # a full disk cannot store the text either
             sys.stderr.write(outcome.trace if isinstance(outcome, StepError) else "")
             sys.stdout.flush()
             sys.stderr.flush()

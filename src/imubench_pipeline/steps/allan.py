@@ -22,7 +22,7 @@ from imubench_pipeline.words.findings.samples import TooShort
 
 
 def report_too_sparse(channel: str, log: ChannelLog) -> Finding:
-    """Return why a channel has no Allan variance, and therefore no estimates."""
+    """Return the finding that a channel is too short, or has too many gaps, for estimates."""
     return find(TooShort(log.grid, rate=log.rate), "fatal", log.grid, channel)
 
 
@@ -49,7 +49,7 @@ def curve_of(
     *,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the Allan variance of a channel, with the same bits for any number of threads."""
+    """Return the Allan variance of a channel; the number of threads changes no bit of it."""
     blocks, holes, segments = log.blocks(), log.holes, log.segments
     gaps = count_gaps(log.blocks()) if holes else NO_GAPS
     if overlap == "full":
@@ -68,7 +68,7 @@ def curve_of(
 
 
 def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]:
-    """Read the curves of a recording by channel; `samples`: number of each, with missing ones."""
+    """Read the Allan variances of a recording by channel; `samples`: their lengths with gaps."""
     by_channel = split_table(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
@@ -96,7 +96,7 @@ def _read_degrees(table: pa.Table) -> dict[str, Any]:
 def read_compensated_curves(
     path: Path, measured: Mapping[str, AllanCurve]
 ) -> dict[str, AllanCurve]:
-    """Read ``allan_compensated`` by channel; `measured`: the curves of the log as it is."""
+    """Read the curves of ``allan_compensated`` by channel; `measured`: the uncompensated curves."""
     by_channel = split_table(read("allan_compensated", [path]), "channel")
     return {
         channel: replace(

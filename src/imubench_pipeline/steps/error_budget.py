@@ -27,7 +27,7 @@ from imubench_pipeline.units import parse_quantity
 def compute_error_tables(
     folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, Iterator[TableRow]]:
-    """Return the rows of the tables of the step from a folder; none for a rejected log."""
+    """Return the rows of each table of the step, by its name; none for a rejected recording."""
     names = {"sensor": sensor, "recording": recording}
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])

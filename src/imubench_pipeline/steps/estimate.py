@@ -65,7 +65,7 @@ from imubench_pipeline.words.reasons import simulations as texts
 
 @dataclass
 class Estimation:
-    """Rows of the tables of the estimation of a recording."""
+    """Estimates of a recording, as rows of each table that the step writes."""
 
     allan: list[model.AllanRow] = field(default_factory=list)
     parameters: list[model.ParameterRow] = field(default_factory=list)
@@ -82,10 +82,10 @@ class Estimation:
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
     """By channel and method: the estimates in the tables ``parameters`` and ``draws``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
-    """Of the temperature, by the file of the log: its channels have one."""
+    """Estimated temperature of each log file, which all channels of the file share."""
 
     def add_findings(self, key: Key, findings: Iterable[Finding]) -> None:
-        """Add the results of a channel."""
+        """Add rows for the findings on a channel."""
         self.estimate_findings += [finding.row(key.sensor, key.recording) for finding in findings]
 
 
@@ -99,7 +99,7 @@ def estimate_channel(
 ) -> None:
     """Estimate the noise of a channel by every method of the settings; add the rows to `into`.
 
-    `curve`: with limits by the identified power laws; `bandwidth`: known cut-off of the sensor, Hz.
+    `curve`: Allan variance of the log; `bandwidth`: stated cut-off of the sensor, Hz, or None.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
     verdict = assess_signals(key.channel, channel.signals, has_temperature=bool(log.temperature))
@@ -177,7 +177,7 @@ class _Channel:
         return estimates
 
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
-        """Return the estimates from the spectrum, and store the associated rows."""
+        """Return the estimates from the spectrum; add the rows of their tables to `into`."""
         key, log = self.key, self.log
         self.fitted = fitted = self._fitted(self._blocks, self._bare)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
@@ -198,7 +198,7 @@ class _Channel:
             )
             best = without.estimates[0]
             if "robust" in self.settings.methods:
-                # The effect that is fitted takes some of the noise with it.
+                # The fitted effect also contains some of the noise.
                 taken = warm.relative_error**2 * added.variance
                 whole = replace(left, variance=left.variance + taken)
                 best = self._fit_robustly(rest, whole, without)
@@ -206,7 +206,7 @@ class _Channel:
 
         limited = partial(add_fitted_limits, segments=log.segments, presence=self._presence)
         into.allan += rows.make_allan_rows(key, limited(self.curve, fitted))
-        if not self.signals.signals:  # else what they explain is taken out
+        if not self.signals.signals:  # removing these also removes slow noise
             white = fitted.estimates[0].parameters["N"].lower
             lack = find_missing_slow_noise(key.channel, fitted.spectrum, fitted.fitted, white)
             if lack is not None:
@@ -230,7 +230,7 @@ class _Channel:
     def state_effects(
         self, findings: Sequence[Finding], estimate: Estimate | None
     ) -> Sequence[Finding]:
-        """Return findings with the effect of the removal of the signals on the parameters."""
+        """Return findings, with the change that removing the signals makes to the parameters."""
         if estimate is None or self.fitted is None or not self.signals.signals:
             return findings
         try:
@@ -392,7 +392,7 @@ def estimate_register_step(log: ChannelLog) -> float:
 def estimate_recording(
     folder: Path, sensor: str, recording: str, settings: str, channels: Container[str] | None = None
 ) -> Estimation:
-    """Return the rows of all or some channels in a folder; none for a rejected recording."""
+    """Return the rows of ``channels`` (None: all) of a recording; none if it was rejected."""
     sections = json.loads(settings)
     into = Estimation()
     logs = load_static_logs(folder)

@@ -25,9 +25,9 @@ def list_files(
     recordings: Iterable[RecordingRow],
     failures: Iterable[FailureRow],
 ) -> Iterator[FileRow]:
-    """Yield the rows of the table ``files``, of every file in the drop zone (`FoundFile`).
+    """Yield a row of the table ``files`` for each of `files`, the files in the drop zone.
 
-    The files of a recording without a row have failed with its sensor.
+    These are `FoundFile` as mappings. A file whose recording has no row failed with its sensor.
     """
     outcome = {(row.sensor, row.recording): row for row in recordings}
     of_sensor = {row.sensor: row.reason for row in failures if row.recording is None}

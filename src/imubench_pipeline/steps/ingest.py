@@ -26,8 +26,8 @@ def write_recording(
 ) -> None:
     """Write the samples of a log, their overview and ``quality.json`` into a folder.
 
-    ``samples``: a folder of their own for the samples, for an object store: there the rules declare
-    each output, and the report reads the metadata from a file instead of the samples.
+    ``samples``: a separate folder for the samples; None: ``folder``. An object store needs it: its
+    rules declare each output, and the report reads the metadata from a file, not from the samples.
     """
     # Results may be a copy of a bucket.
     shutil.rmtree(folder / SAMPLES_FOLDER, ignore_errors=True)

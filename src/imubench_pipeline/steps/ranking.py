@@ -21,7 +21,7 @@ from imubench_pipeline.tables.files import read, write_each
 OtherErrors = Callable[
     [pa.Table, Sequence[RecordingRow], Mapping[str, Requirement]], Iterable[ErrorBudgetRow]
 ]
-"""Returns errors that are not of dead reckoning, to judge: of a table, recordings, requirements."""
+"""Takes a table, recordings and requirements; returns errors to judge besides dead reckoning."""
 
 _LIMITS: Hook[OtherErrors] = Hook("limits")
 

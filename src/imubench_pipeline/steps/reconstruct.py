@@ -30,7 +30,7 @@ class Reconstruction:
     curve_rows: list[ReconstructionRow]
     score_row: ScoreRow
     differences: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """RMS of each member with equal weights, as Maia et al., Table 3, for one."""
+    """RMS difference from the log of each member, taus equally weighted (Maia et al., Table 3)."""
 
 
 def reconstruct(
@@ -98,7 +98,7 @@ class ReconstructionRows:
 def reconstruct_recording(
     folder: Path, settings: ReconstructionSettings, channels: Container[str] | None = None
 ) -> ReconstructionRows:
-    """Return the rows of all or some channels of a recording that have estimates."""
+    """Return the rows of a recording's channels with estimates; ``channels``: these, or all."""
     about = Quality.read(folder / "quality.json")
     measured = read_curves(folder / "allan.parquet", about.grids)
     left = read_compensated_curves(folder / "allan_compensated.parquet", measured)
@@ -117,7 +117,7 @@ def reconstruct_recording(
             results[estimate.method] = reconstruct(key, estimate, curve, rate, settings, series)
         recommended = results[best[channel].method].differences
         for method, result in results.items():
-            # Of the log without what temperature adds the curve is another.
+            # The compensated log has another curve, so that its RMS cannot be compared.
             same = method != "compensated" and result.differences.size and recommended.size
             chance = beats(result.differences, recommended) if same else None
             rows.scores.append(replace(result.score_row, beats=chance))

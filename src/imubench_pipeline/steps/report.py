@@ -14,7 +14,7 @@ def write_report(
     *,
     one_file: bool = False,
 ) -> None:
-    """Write the report; its start page is the last to appear, or the only one with `one_file`."""
+    """Write the report; the start page is written last, or with `one_file` contains all pages."""
     folder = start_page.parent
     site = make_site(
         {path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent

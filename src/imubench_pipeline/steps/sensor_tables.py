@@ -29,9 +29,9 @@ from imubench_pipeline.units import parse_quantity
 SensorTable = Callable[
     [str, Sequence[model.SimulatedTruthRow], Mapping[str, pa.Table]], Iterable[TableRow]
 ]
-"""Returns the rows of a table of a sensor.
+"""Returns the rows of a further table of a sensor.
 
-By its simulated recordings, as the plan wrote them, their true parameters, and its other tables.
+Takes its simulated recordings, as JSON from the plan, their true parameters, and its other tables.
 """
 
 _ADDED: Hook[SensorTable] = Hook("sensor_tables")
@@ -40,7 +40,7 @@ _ADDED: Hook[SensorTable] = Hook("sensor_tables")
 def join_tables(
     parts: Mapping[str, list[Path]], truths: str, sensor: str, usual: str, decide: str
 ) -> dict[str, pa.Table]:
-    """Return every table of recordings, joined for a sensor.
+    """Return the tables of a sensor, joined from its recordings or derived from them.
 
     `parts`: files of each table, in the order of the recordings, and ``quality`` for the JSON
     files. `truths`, `sensor`, `usual`: true parameters of simulated recordings, the sensor file
@@ -118,9 +118,9 @@ def collect_findings(
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
 ) -> list[FindingRow]:
-    """Return the rows of the table ``findings`` about single recordings, of the ingest and later.
+    """Return the rows of the table ``findings`` on single recordings, from all steps.
 
-    `deterministic`, `of_estimates`: of these tables; `estimated`: the recommended parameters.
+    `of_estimates`: findings of the step ``estimate``; `estimated`: the recommended parameters.
     """
     about = [quality.recording for quality in qualities]
     of_logs = drop_duplicate_findings(
@@ -175,7 +175,7 @@ def drop_duplicate_findings(
 
 
 def list_true_parameters(truths: str) -> Iterator[model.SimulatedTruthRow]:
-    """Yield the rows of the table ``simulated_truth``."""
+    """Yield the rows of the table ``simulated_truth``; `truths`: recordings, as JSON."""
     for entry in json.loads(truths):
         recording = SimulatedRecording.model_validate(entry)
         rate = parse_quantity(recording.rate, "frequency")

@@ -21,7 +21,7 @@ from imubench_pipeline.tables.files import make_folder
 from imubench_pipeline.units import parse_quantity
 
 Motion = Callable[[SimulatedRecording, float], Mapping[str, Profile]]
-"""Returns what ideal channels sense in an experiment, by its recording and sampling rate, Hz."""
+"""Takes a recording and its rate, Hz; returns the ideal signal of each channel as it moves."""
 
 _MOTIONS: Hook[Motion] = Hook("motions")
 
@@ -33,8 +33,8 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     """
     if log.reader not in (None, "csv"):
         raise ConfigError(
-            f"{recording.sensor}: simulated logs are written as text, the sensor file has "
-            f"reader {log.reader!r}"
+            f"{recording.sensor}: the sensor file has reader {log.reader!r}, but simulated logs "
+            "are text; expected reader: csv"
         )
     rate = parse_quantity(recording.rate, "frequency")
     files: dict[str, dict[str, ColumnSource]] = {}
@@ -80,7 +80,7 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
 
 
 def write_recording(settings: str, folder: Path) -> None:
-    """Write the recording into ``folder``, which appears when it is complete."""
+    """Simulate a recording into ``folder``, which appears when complete; ``settings``: JSON."""
     sections = json.loads(settings)
     recording = SimulatedRecording.model_validate(sections["recording"])
     with make_folder(folder) as made:

@@ -14,7 +14,7 @@ from imubench_pipeline.tables.keys import split_table
 
 
 def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
-    """Return every table, joined from its files in order, with failed steps in ``failures``."""
+    """Join each table from its files; failed steps are rows of the table ``failures``."""
     joined, failures = {}, dict[Failure, None]()
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
@@ -66,7 +66,7 @@ def write_parts(table: pa.Table, folder: Path, recordings: pa.Table) -> None:
 
 
 def remove_parts(path: Path) -> None:
-    """Remove the folder of a table that is to be one file, and its stored parts."""
+    """Remove the folder and the stored parts of a table, before it is written as one file."""
     if path.is_dir():
         shutil.rmtree(path)
     shutil.rmtree(path.parent / _STORE / path.stem, ignore_errors=True)

@@ -22,9 +22,9 @@ _PARQUET = {"format": "parquet", "mediatype": "application/vnd.apache.parquet"}
 def describe_tables(software: object, csv: Container[str] = TABLES) -> Mapping[str, object]:
     """Return the descriptor of the joined tables: name, type, unit and meaning of each column.
 
-    It follows version 2.0 of the standard. Resources are the CSV files, in which ``;`` joins lists,
-    or Parquet for tables that are not in ``csv``. Additions to it are ``parquet``, the same table
-    as Parquet, ``unit``, and ``software``.
+    It follows Data Package 2.0. A resource is a CSV file, in which ``;`` joins lists, or a Parquet
+    file if the table is not in ``csv``. The keys ``parquet`` (the same table as Parquet), ``unit``
+    and ``software`` (see `read_software`) are not part of the standard.
     """
     return {
         "$schema": "https://datapackage.org/profiles/2.0/datapackage.json",
@@ -46,7 +46,7 @@ def describe_tables(software: object, csv: Container[str] = TABLES) -> Mapping[s
 
 
 def read_software(results: Path) -> Mapping[str, str]:
-    """Return the version of the program and the digest of the settings of a run, if known."""
+    """Return version of the program and digest of the settings of a run; empty if unknown."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         return {**read_json(find_tables_folder(results) / FILE)["software"]}
     return {}

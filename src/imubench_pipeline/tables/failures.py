@@ -41,7 +41,7 @@ class Failure:
 
     @property
     def name(self) -> str:
-        """Name of the omitted recording or sensor."""
+        """``sensor/recording``, or the sensor alone for a step of the whole sensor."""
         return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
 
     def row(self) -> FailureRow:
@@ -49,12 +49,12 @@ class Failure:
         return FailureRow(**asdict(self))
 
     def finding(self) -> Finding:
-        """Return the finding about the recording."""
+        """Return the fatal finding that states this failure."""
         return find(Failed(self.reason), "fatal", 1.0)
 
 
 def describe_error(error: BaseException) -> str:
-    """Return an error in words, the same in each run: without addresses and folders."""
+    """Return the text of an error without memory addresses and folders, which vary by run."""
     if isinstance(error, UnavailableError):
         return str(error)
     text = "".join(traceback.format_exception_only(error)).strip()
@@ -64,7 +64,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def read_failure(path: Path) -> Failure | None:
-    """Return why an output, Parquet or ``quality.json``, is empty; None without a failure."""
+    """Return the failure that left an output, Parquet or ``quality.json``, empty; or None."""
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             failure = files.read_json(path).get("failure")
@@ -76,13 +76,13 @@ def read_failure(path: Path) -> Failure | None:
 
 
 def parse_failure(read: pa.Schema) -> Failure | None:
-    """Return the failure in the metadata of a table."""
+    """Return the failure in the metadata of a table; None without one."""
     text = (read.metadata or {}).get(_METADATA)
     return Failure(**json.loads(text)) if text else None
 
 
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
-    """Read and join files of one table, and return the failures of the empty ones."""
+    """Return the joined files of one table, and the failures that left some of them empty."""
     parts = [files.read_part(table, path) for path in paths]
     failures = [
         failure for part in parts if len(part) == 0 and (failure := parse_failure(part.schema))
@@ -91,7 +91,7 @@ def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, lis
 
 
 def write_empty(tables: Iterable[Path], failure: Failure) -> None:
-    """Write the tables of a failed step: no rows, and the failure as metadata."""
+    """Write empty tables for a failed step, with the failure in their metadata."""
     metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
         files.write_arrow(
@@ -102,10 +102,11 @@ def write_empty(tables: Iterable[Path], failure: Failure) -> None:
 def mark_failures(
     tables: Mapping[str, pa.Table], failures: Sequence[Failure]
 ) -> dict[str, pa.Table]:
-    """Return tables with the failures, and without failed recordings.
+    """Return tables in which failures are listed and failed recordings have no results.
 
-    A recording with a failed step has the status ``failed``, a finding, and no rows in other
-    tables, unless the step needs more than a static log.
+    A recording with a failed step gets a finding and the status ``failed``; its rows in other
+    tables are removed. A static recording keeps its status and rows if the failed step needs more
+    than a static log.
     """
     if not failures:
         return {"failures": files.make_schema("failures").empty_table()} | dict(tables)
@@ -142,7 +143,7 @@ def mark_failures(
 
 
 def append_new_rows(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
-    """Append other rows that are not yet among the rows."""
+    """Return ``listed`` rows, followed by those ``rows`` that are not among them."""
     known = {tuple(row.columns().values()) for row in listed}
     return [*listed, *(row for row in rows if tuple(row.columns().values()) not in known)]
 
@@ -150,7 +151,7 @@ def append_new_rows(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
 def remove_recordings(
     tables: Mapping[str, pa.Table], left_out: Container[tuple[str, str | None]]
 ) -> dict[str, pa.Table]:
-    """Return tables without the rows of some (sensor, recording), except rows with the reason."""
+    """Return tables without rows of ``left_out`` recordings; tables with the reasons keep them."""
     filtered = dict(tables)
     for name, table in tables.items():
         if "recording" in table.schema.names and name not in _NAMED:

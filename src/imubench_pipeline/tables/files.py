@@ -25,11 +25,11 @@ _LONGEST_NAME = 240  # bytes of a name to which a temporary one can add; file sy
 
 
 class TableError(ValueError):
-    """Rows that do not fit the schema of their table."""
+    """A table that does not fit its schema, is damaged, or is missing."""
 
 
 def get_columns(table: str) -> tuple[TypedColumn, ...]:
-    """Return the columns of a table, by its name or by the name of a file of a recording."""
+    """Return the columns of a table, by its name or by the name of a part, such as ``curve``."""
     return TABLES[PARTS_OF.get(table, table)]
 
 
@@ -51,15 +51,15 @@ def make_schema(table: str) -> pa.Schema:
 def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
     """Make an Arrow table of rows and check it against the schema of ``table``.
 
-    A column that a row leaves out, NaN and infinities become null; invisible characters are
-    escaped. Raises a `TableError` for a column that the table does not have, and a missing required
-    value.
+    Missing values, NaN and infinities become null; invisible characters are escaped. Raises a
+    `TableError` for an unknown column, a value outside its category, or a missing required value.
     """
     listed = [row.columns() if isinstance(row, TableRow) else row for row in rows]
     columns = get_columns(table)
     unknown = {name for row in listed for name in row} - {column.name for column in columns}
     if unknown:
-        raise TableError(f"table {table}: unknown columns {sorted(unknown)}")
+        expected = ", ".join(column.name for column in columns)
+        raise TableError(f"table {table}: unknown columns {sorted(unknown)}; expected {expected}")
     arrays = []
     for column in columns:
         values = [_plain(row.get(column.name)) for row in listed]
@@ -72,7 +72,8 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
             )
         array = pa.array(values, type=column.type, from_pandas=True)
         if column.required and array.null_count:
-            raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
+            fault = f"column {column.name} has {array.null_count} nulls"
+            raise TableError(f"table {table}: {fault}; expected a value in every row")
         arrays.append(array)
     return pa.Table.from_arrays(arrays, schema=make_schema(table))
 
@@ -104,7 +105,7 @@ def _not_finite(table: pa.Table) -> str:
 
 @contextlib.contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
+    """Yield a temporary file beside ``path``; rename it to ``path`` if the block succeeds."""
     path.parent.mkdir(parents=True, exist_ok=True)
     # The temporary name is longer, and must not be too long where the name itself is not.
     stem = path.name if len(os.fsencode(path.name)) <= _LONGEST_NAME else path.name[:60]
@@ -124,12 +125,12 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def make_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder to fill, renamed to ``folder``, which is missing or empty, at the end."""
+    """Yield a folder to fill; rename it to ``folder``, missing or empty, if the block succeeds."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
     try:
         inside = scratch / folder.name
-        inside.mkdir()  # beside what mkdtemp makes private
+        inside.mkdir()  # with the usual permissions: mkdtemp makes a private folder
         yield inside
         inside.rename(folder)
     finally:
@@ -142,14 +143,14 @@ def write(table: str, rows: Iterable[AnyRow], path: Path) -> None:
 
 
 def write_each(tables: Mapping[str, Iterable[AnyRow]], outputs: Iterable[Path]) -> None:
-    """Write the rows of tables, by name, to the files of the same names."""
+    """Write to each output the rows of the table after which the file is named."""
     built = {name: build(name, rows) for name, rows in tables.items()}
     for output in outputs:
         write_arrow(built[output.stem], output)
 
 
 def write_arrow(table: pa.Table, path: Path) -> None:
-    """Write an Arrow ``table`` as Parquet or, where the ``path`` ends so, CSV, atomically.
+    """Write an Arrow table, atomically: as CSV if ``path`` ends with ``.csv``, else as Parquet.
 
     Raises a `TableError` for NaN or infinities.
     """
@@ -167,9 +168,9 @@ def write_arrow(table: pa.Table, path: Path) -> None:
 
 
 def link_part(name: str, part: pa.Table, stored: Path, folder: Path) -> None:
-    """Put a part of a table into a folder, as a link to a stored file.
+    """Add a part of the table ``name`` to a folder, as a hard link to a stored file, or a copy.
 
-    That file is written only if its rows are others, or damaged.
+    The stored file is written only if it is missing or damaged, or contains other rows.
     """
     try:
         is_same = read_part(name, stored).equals(part)
@@ -184,12 +185,12 @@ def link_part(name: str, part: pa.Table, stored: Path, folder: Path) -> None:
 
 
 def write_csv(table: pa.Table, file: BinaryIO) -> None:
-    """Write a table as CSV: texts are no formulas, lists are joined by ``;``, structs are JSON."""
+    """Write a table as CSV: formulas are escaped, lists joined by ``;``, structs are JSON."""
     pacsv.write_csv(escape_cells(table), file)
 
 
 def locate_table(results: Path, table: str) -> Path:
-    """Return the path of a joint table of a run: a file, or a folder with parts of it."""
+    """Return the path of a joined table of a run: a file, or a folder with parts of the table."""
     return results / "tables" / f"{table}.parquet"
 
 
@@ -200,16 +201,16 @@ def find_tables_folder(results: Path) -> Path:
 
 
 def find_tables(results: Path, names: Iterable[str]) -> dict[str, Path]:
-    """Return the paths of tables of a run, by name; ``results`` as `find_tables_folder` takes it.
+    """Return the paths of tables of a run, by name; ``results`` is as in `find_tables_folder`.
 
-    Raises a `TableError` if one is missing.
+    Raises a `TableError` if a table is missing.
     """
     folder = find_tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in names}
     if missing := [name for name, path in paths.items() if not path.exists()]:
         raise TableError(
             f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
-            "finished run, such as results: `snakemake -c2` makes it"
+            "finished run, such as results/; `snakemake -c2` makes it"
         )
     return paths
 
@@ -227,10 +228,10 @@ def join_tables(table: str, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
-    """Read one file of a table, with its metadata, or a folder with parts of it, in order.
+    """Read a table from one file, with its metadata, or from a folder with parts of it, in order.
 
-    Of ``any_version``, missing columns that may be null are null, and unknown ones left out. Raises
-    a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
+    With ``any_version``, missing columns that may be null become null, and unknown ones are left
+    out. Raises a `TableError` if the file is damaged, has other columns, or NaN or infinities.
     """
     part, expected = _load_part(path), make_schema(table)
     if any_version:
@@ -243,12 +244,12 @@ def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
         part = part.select(known)
     if other := _other_columns(part.schema, expected):
         raise TableError(
-            f"{path}: was made by another version of imubench_pipeline: {other}; run snakemake -c2 "
-            "again, as for these results, and it is made anew"
+            f"{path} was made by another version of imubench_pipeline: {other}; run snakemake -c2 "
+            "again, with the same options as for these results, to make it again"
         )
     if fault := _not_finite(part):
         raise TableError(
-            f"{path}: {fault}; expected a finite number or null: remove the file, and the next run "
+            f"{path}: {fault}; expected a finite number or null; remove the file, and the next run "
             "makes it again"
         )
     if part.schema.equals(expected):
@@ -263,7 +264,7 @@ def _load_part(path: Path) -> pa.Table:
         return pa.concat_tables(parts) if parts else _load_part(path / "empty.parquet")
     try:
         if path.exists() and not path.is_file():  # a pipe never answers
-            raise pa.ArrowInvalid("it is no file")
+            raise pa.ArrowInvalid("it is not a regular file")
         if is_seal_broken(path):
             raise pa.ArrowInvalid("its metadata were changed")
         with open_parquet(path) as file:
@@ -274,7 +275,7 @@ def _load_part(path: Path) -> pa.Table:
         raise
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise TableError(
-            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
+            f"{path} is damaged ({error}); remove it, and the next run makes it again"
         ) from error
 
 
@@ -283,7 +284,7 @@ def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
         missing = [name for name in expected.names if name not in actual.names]
         unknown = [name for name in actual.names if name not in expected.names]
         faults = [f"it has no {', '.join(missing)}"] * bool(missing)
-        faults += [f"it has {', '.join(unknown)}, not known here"] * bool(unknown)
+        faults += [f"it has unknown columns {', '.join(unknown)}"] * bool(unknown)
         return " and ".join(faults) or "its columns have another order"
     for name in expected.names:
         here, due_field = actual.field(name), expected.field(name)
@@ -297,19 +298,19 @@ def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
 
 
 def write_content(content: str | bytes, path: Path) -> None:
-    """Write a text or bytes, atomically."""
+    """Write a text, as UTF-8, or bytes to a file, atomically."""
     with replace_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def read_json(path: Path) -> Any:
-    """Read JSON; raises a ValueError if it is invalid, or nested deeper than Python reads."""
+    """Return the content of a JSON file; ValueError if it is invalid or nested too deeply."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
-        raise ValueError(f"{path}: lists and mappings too deep in each other") from None
+        raise ValueError(f"{path}: lists and mappings are nested too deeply to be read") from None
 
 
 def write_json(data: object, path: Path) -> None:
-    """Write JSON, atomically."""
+    """Write data as JSON, atomically; raise ValueError for NaN or infinities."""
     write_content(json.dumps(data, indent=1, allow_nan=False) + "\n", path)

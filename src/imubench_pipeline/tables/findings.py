@@ -8,7 +8,7 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.words.findings.base import FindingData
 
-LEFT_OUT = ("rejected", "failed")  # of recordings that are left out: listed by themselves
+LEFT_OUT = ("rejected", "failed")  # codes of findings about left-out recordings, listed separately
 
 _HALF_REASON = 700
 _ADDRESS = re.compile(r" at 0x[0-9a-f]{6,}")
@@ -50,17 +50,17 @@ def find(
 
 
 def make_finding(row: FindingRow) -> Finding:
-    """Return the finding of a row of the table ``findings``."""
+    """Convert a row of the table ``findings`` back to a `Finding`."""
     return Finding(**{field.name: getattr(row, field.name) for field in fields(Finding)})
 
 
 def remove_addresses(reason: str) -> str:
-    """Return a text without addresses of objects, which differ between runs."""
+    """Return a text without memory addresses of objects, which differ between runs."""
     return _ADDRESS.sub("", reason)
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the text is cut and printable, and says how to mend it."""
+    """A recording that cannot be used; long messages are shortened, and all are made printable."""
 
     def __init__(self, reason: str) -> None:
         if not reason.isprintable():

@@ -14,7 +14,7 @@ _Row = TypeVar("_Row")
 
 @dataclass(frozen=True)
 class Key:
-    """Sensor, recording and channel."""
+    """Key of a channel in tables."""
 
     sensor: str
     recording: str
@@ -22,7 +22,7 @@ class Key:
 
 
 def group_rows(rows: Iterable[_Row], key: Callable[[_Row], _Key]) -> dict[_Key, list[_Row]]:
-    """Divide rows by a key, in the order in which the keys appear."""
+    """Return lists of rows by key, in the order in which the keys first appear."""
     groups: dict[_Key, list[_Row]] = {}
     for row in rows:
         groups.setdefault(key(row), []).append(row)
@@ -30,7 +30,7 @@ def group_rows(rows: Iterable[_Row], key: Callable[[_Row], _Key]) -> dict[_Key, 
 
 
 def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
-    """Divide a table by the values of columns, in the order in which they appear."""
+    """Return parts of a table by the values of the named columns, in order of appearance."""
     if not table.num_rows:
         return {}
     labels = np.zeros(table.num_rows, dtype=np.int64)

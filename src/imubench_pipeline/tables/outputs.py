@@ -45,19 +45,19 @@ class Output:
     path: Path  # as it was named
     adds_to: Collection[str] = ()  # kinds of places to which it may add new files
     force: bool = False  # replace regular files
-    places: Callable[[Path], Iterable[Place]] = lambda _: ()  # of the projects about a path
+    places: Callable[[Path], Iterable[Place]] = lambda _: ()  # protected ones around a path
     inputs: Sequence[Path] = ()  # files that the command reads
 
     def __str__(self) -> str:
         return escape_invisible(str(self.path))
 
     def check(self) -> Path:
-        """Return the output path with links resolved; raises an `OutputError`."""
+        """Return the path with links resolved; raise an `OutputError` if it must not be written."""
         raise NotImplementedError
 
     def _resolve(self) -> tuple[Path, os.stat_result | None]:
         if not str(self.path).isprintable():
-            raise OutputError(f"{self}: expected a name of printable characters")
+            raise OutputError(f"{self} contains invisible characters; choose a printable name")
         try:
             status = self.path.stat()
         except (FileNotFoundError, NotADirectoryError):
@@ -66,11 +66,11 @@ class Output:
             raise OutputError(f"{self}: {explain(error)}") from None
         real = Path(os.path.realpath(self.path))
         if status is not None and not _is_at(real, status):
-            raise OutputError(f"{self}: has no name in a folder; name a file")
+            raise OutputError(f"{self} leads to no named file, but to a pipe, say; choose a file")
         there = next(folder for folder in (real, *real.parents) if folder.exists())
         if status is None and not there.is_dir():
             raise OutputError(
-                f"{self}: {escape_invisible(str(there))} is no folder; name another place"
+                f"{self}: {escape_invisible(str(there))} is not a folder; choose another place"
             )
         if not os.access(there.parent if status is not None else there, os.W_OK | os.X_OK):
             raise OutputError(f"{self}: {explain(PermissionError(errno.EACCES, 'Not writable'))}")
@@ -96,11 +96,11 @@ class Output:
                 continue
             if place.kind in self.adds_to:
                 raise OutputError(
-                    f"{self}: exists already, among {place.holds}, which no command replaces; name "
-                    "another one, or remove it first"
+                    f"{self} exists already, among {place.holds}, which no command replaces; "
+                    "choose another name, or remove it first"
                 )
             raise OutputError(
-                f"{self}: belongs to {place}, where this command writes nothing; name a place "
+                f"{self} belongs to {place}, where this command writes nothing; choose a place "
                 "outside"
             )
 
@@ -110,24 +110,24 @@ class OutputFile(Output):
     """A file that a command writes."""
 
     def check(self) -> Path:
-        """Return the output path with links resolved."""
+        """Return the path with links resolved; raise an `OutputError` if it must not be written."""
         real, status = self._resolve()
         if status is not None and stat.S_ISDIR(status.st_mode):
-            raise OutputError(f"{self}: is a folder; name a file in it")
+            raise OutputError(f"{self} is a folder; choose a file in it")
         if status is not None and not stat.S_ISREG(status.st_mode):
-            raise OutputError(f"{self}: is a device, a pipe or a socket; name a file")
+            raise OutputError(f"{self} is a device, a pipe or a socket; choose a regular file")
         self._check_place(real, exists=status is not None)
         if status is None:
             return real
         if any(_is_at(path, status) for path in self.inputs):
-            raise OutputError(f"{self}: is an input of the command; name another file")
+            raise OutputError(f"{self} is an input of the command; choose another file")
         if not self.force:
-            raise OutputError(f"{self}: exists already; name another file, or add --force")
+            raise OutputError(f"{self} exists already; choose another file, or add --force")
         return real
 
     @contextmanager
     def replacing(self) -> Iterator[Path]:
-        """Give a temporary name, renamed to the output when the block ends without error."""
+        """Yield a temporary path; rename it to the output if the block succeeds."""
         with self._explaining(), replace_file(self.check()) as temporary:
             yield temporary
             self.check()
@@ -138,7 +138,7 @@ class OutputFile(Output):
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
     def beside(self, path: Path) -> "OutputFile":
-        """Return a second file of the same output."""
+        """Return the output for another path, with the same rules."""
         return replace(self, path=path)
 
 
@@ -151,30 +151,30 @@ class OutputFolder(Output):
     shared: bool = False  # it may have other files: only its own are refused where they exist
 
     def check(self) -> Path:
-        """Return the output folder with links resolved."""
+        """Return the path with links resolved; raise an `OutputError` if it must not be written."""
         real, status = self._resolve()
         if status is not None and not stat.S_ISDIR(status.st_mode):
-            raise OutputError(f"{self}: is a file; name a folder")
+            raise OutputError(f"{self} is a file; choose a folder")
         self._check_place(real, exists=False)
         if self.shared or status is None:
             return real
         for place in self.places(real):
             if place.path.exists() and _is_in(Path(os.path.realpath(place.path)), real):
-                raise OutputError(f"{self}: holds {place}; name another folder")
+                raise OutputError(f"{self} contains {place}; choose another folder")
         if not self.force and any(real.iterdir()) and not self.is_earlier(real):
             raise OutputError(
-                f"{self}: is not empty; name another folder, or add --force, which replaces files "
+                f"{self} is not empty; choose another folder, or add --force, which replaces files "
                 "of the same name and leaves all others"
             )
         return real
 
     def file(self, name: str) -> OutputFile:
-        """Return a file in it."""
+        """Return the output for a file in the folder, with the same rules."""
         return OutputFile(self.path / name, self.adds_to, self.force, self.places, self.inputs)
 
     @contextmanager
     def filling(self) -> Iterator[Path]:
-        """Give a folder to fill, whose new or changed files are moved here at the end."""
+        """Yield a folder to fill; move its new or changed files to the output at the end."""
         real = self.check()
         if not real.exists():
             with self._explaining(), make_folder(real) as made:
@@ -194,7 +194,7 @@ class OutputFolder(Output):
                 target = replace(self.file(str(name)), force=True).check()
                 if not target.is_relative_to(real):
                     raise OutputError(
-                        f"{self}: {name} in it is a link that leads out; remove the link"
+                        f"{self}: {name} in it is a link to a place outside; remove the link"
                     )
                 moves.append((path, target))
             for source, target in moves:
@@ -204,7 +204,7 @@ class OutputFolder(Output):
 
 
 class StoreOutput(argparse.Action):
-    """Stores an output, whose path is the value of the option."""
+    """Parser action that stores the value of an option as an `Output`."""
 
     def __init__(self, *arguments: Any, make: Callable[[Path], Output], **keys: Any) -> None:
         super().__init__(*arguments, **keys)
@@ -221,9 +221,10 @@ def add_output(
     make: Callable[[Path], Output] = OutputFile,
     **keys: Any,
 ) -> None:
-    """Declare an option, or an argument, that names an output, and beside it ``--force``.
+    """Declare an argument that names an output; with an option, declare ``--force`` too.
 
-    ``make`` makes the output of its path; ``keys`` are of `argparse.ArgumentParser.add_argument`.
+    ``make`` returns the `Output` for a path; ``keys`` are passed on to
+    `argparse.ArgumentParser.add_argument`.
     """
     parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
     if name.startswith("-"):
@@ -234,25 +235,25 @@ def add_output(
 
 
 _MENDED = {
-    errno.ENOSPC: "make room on the disk, or name a place on another one",
-    errno.EDQUOT: "make room on the disk, or name a place on another one",
-    errno.EFBIG: "the system allows no larger file: name a place elsewhere, or raise the limit",
-    errno.EACCES: "name a place that you may write to, or change its permissions",
-    errno.EPERM: "name a place that you may write to, or change its permissions",
-    errno.EROFS: "name a place that can be written to",
-    errno.ENAMETOOLONG: "name a shorter one",
-    errno.ELOOP: "remove the links that lead to each other, or name another place",
+    errno.ENOSPC: "free space on the disk, or choose a place on another disk",
+    errno.EDQUOT: "free space on the disk, or choose a place on another disk",
+    errno.EFBIG: "the system allows no larger file: choose another place, or raise the limit",
+    errno.EACCES: "choose a place that you may write to, or change the permissions",
+    errno.EPERM: "choose a place that you may write to, or change the permissions",
+    errno.EROFS: "choose a place that can be written to",
+    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.ELOOP: "remove the links that lead to each other, or choose another place",
 }
 
 
 def explain(error: OSError) -> str:
-    """Return the fault of a file, and how to mend it, as one line."""
-    mended = _MENDED.get(error.errno or 0, "name another place")
+    """Return the reason of an error of the file system, and how to mend it, as one line."""
+    mended = _MENDED.get(error.errno or 0, "choose another place")
     return f"{escape_invisible(error.strerror or str(error))}; {mended}"
 
 
 def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable[Place]]) -> None:
-    """Check all outputs that the options of a command name; raises an `OutputError`."""
+    """Check all outputs among the options of a command; raise an `OutputError` if one fails."""
     values = list(vars(options).values())
     listed = [one for value in values for one in (value if isinstance(value, list) else [value])]
     # A text counts as a file only with a suffix: a sensor may have the name of an output.

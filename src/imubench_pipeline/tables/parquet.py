@@ -33,7 +33,8 @@ def read_row_group(file: pq.ParquetFile, number: int, columns: list[str] | None 
     table = file.read_row_group(number, columns=columns, use_threads=False)
     expected = file.metadata.row_group(number).num_rows
     if table.num_rows != expected:
-        raise pa.ArrowInvalid(f"row group {number} has {table.num_rows} rows, not {expected}")
+        found = f"row group {number} has {table.num_rows} rows"
+        raise pa.ArrowInvalid(f"{found}, expected {expected}; the file is damaged")
     return table
 
 
@@ -47,7 +48,7 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
     footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
-        raise RuntimeError(f"{path}: its metadata do not have the expected layout")
+        raise RuntimeError(f"{path}: no digest in the metadata; use a tested version of pyarrow")
     with path.open("r+b") as file:
         file.seek(place.start(1) - len(footer), 2)
         file.write(hashlib.sha256(footer).hexdigest().encode())

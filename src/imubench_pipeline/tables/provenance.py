@@ -19,12 +19,12 @@ _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
 def digest_sources(*modules: str) -> str:
-    """Return a digest of ``modules`` of this package and of all other code and files that they use.
+    """Return a digest of ``modules`` of this package and of all code and files that they use.
 
-    These are their imports, extensions of it (`imubench_pipeline.registry`), and modules and files
-    that their texts name: a module in full, every module of a package by a name that ends in
-    ``.*``, or a file or folder beside the module. ``modules`` are such as ``estimators.curve``.
-    Raises a ValueError for an unknown one.
+    They use the modules that they import, extensions (`imubench_pipeline.registry`), and whatever a
+    string in the code names: a module in full, all modules of a package (by a name that ends in
+    ``.*``), or a file or folder beside the module. ``modules`` are names such as
+    ``estimators.curve``. Raises a ValueError for an unknown module.
     """
     todo, seen = [_path(module) for module in modules], set()
     while todo:
@@ -43,7 +43,7 @@ def _path(module: str) -> Path:
     for path in (base.with_suffix(".py"), base / "__init__.py"):
         if path.is_file():
             return path
-    raise ValueError(f"no module {module!r} in {_NAME}")
+    raise ValueError(f"no module {module!r} in {_NAME}; expected a name like 'estimators.curve'")
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Digests of files, and seals: digests of the inputs and outputs of each step, kept apart.
+"""Digests of files, and seals: files with the digests of the inputs and outputs of a step.
 
 An intact file may still be the wrong one, for example from another recording or a backup.
 """
@@ -30,23 +30,23 @@ def write_sealed_json(data: Mapping[str, object], path: Path) -> None:
 
 
 def read_sealed_json(path: Path) -> JsonObject:
-    """Return the data of `write_sealed_json`; ValueError if any byte has changed, or OSError."""
+    """Return the data that `write_sealed_json` wrote; ValueError if any byte has changed."""
     # All letters count, and not only what they mean.
     with open(path, "rb", opener=open_without_waiting) as file:
         text = file.read().decode()
     seal = _LAST_LINE.search(text)
     rest = text[: seal.start()] + _END if seal else text
     if seal is None or seal[0] != _last_line(rest):
-        raise ValueError(f"{path}: its digest is another one")
+        raise ValueError(f"{path}: its digest does not match its content; restore or remove it")
     try:
         data: JsonObject = json.loads(rest)
     except RecursionError:
-        raise ValueError(f"{path}: is nested deeper than permitted") from None
+        raise ValueError(f"{path}: its content is nested too deeply to be read") from None
     return data
 
 
 def open_without_waiting(path: str, flags: int) -> int:
-    """Open a file without blocking: a pipe without a writer is empty."""
+    """Open a file, as the ``opener`` of `open`, without waiting for the writer of a pipe."""
     return os.open(path, flags | os.O_NONBLOCK)
 
 
@@ -87,14 +87,14 @@ class SealedFile:
 
     @classmethod
     def of(cls, path: Path) -> "SealedFile":
-        """Read a file."""
+        """Return the present state of a file."""
         about = path.stat()
         return cls(about.st_size, compute_digest(path), about.st_mtime_ns)
 
     def fault(self, path: Path, *, whole: bool) -> str | None:
-        """Return the fault of a file; None without one.
+        """Return how a file differs from this state, in words; None if it does not.
 
-        Unless ``whole``, its content is read only if it was changed since.
+        Unless ``whole``, the content is read only if the time of modification differs.
         """
         try:
             about = path.stat()
@@ -107,15 +107,15 @@ class SealedFile:
         except (FileNotFoundError, NotADirectoryError):
             return f"expected {self.size} bytes, found no such file"
         except OSError as error:
-            return f"expected {self.size} bytes, found what cannot be read ({error.strerror})"
+            return f"expected {self.size} bytes, but the file cannot be read ({error.strerror})"
         return None
 
 
 @dataclass(frozen=True)
 class Seal:
-    """The inputs and outputs of a step."""
+    """Digests of the inputs and outputs of a step, with its settings and version."""
 
-    place: str  # as of `name_place`
+    place: str  # from `name_place`
     form: str  # as `compute_form_digest` gave it
     inputs: dict[str, str]  # digests by place below the results
     outputs: dict[str, SealedFile]
@@ -123,7 +123,7 @@ class Seal:
     version: str = ""  # of the program that made the outputs
 
     def write(self, results: Path) -> None:
-        """Keep it, atomically."""
+        """Write the seal below the results, atomically."""
         write_sealed_json(asdict(self), results / name_seal_file(self.place))
 
 
@@ -135,7 +135,7 @@ class SealError(ValueError):
 
 
 def name_place(step: str, sensor: str | None = None, recording: str | None = None) -> str:
-    """Return the path of the seal of a step, of a recording, a sensor, or all of them."""
+    """Return the place of the seal of a step: of a recording, a sensor, or the whole run."""
     if recording is not None:
         return f"recordings/{sensor}/{recording}/{step}"
     return f"sensors/{sensor}/{step}" if sensor is not None else step
@@ -151,8 +151,8 @@ def seal_files(
 ) -> None:
     """Seal the outputs of a step: files, or folders with all their files.
 
-    ``inputs``: of `compute_digests`; ``settings``: a digest of the settings and code of the step;
-    ``made_by``: the version of the program.
+    ``place`` is from `name_place`, ``inputs`` from `compute_digests`; ``settings`` is a digest of
+    the settings and code of the step, ``made_by`` the version of the program.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
     Seal(place, compute_form_digest(), dict(inputs), left, settings, made_by).write(results)
@@ -169,7 +169,7 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
 
 def list_missing_inputs(results: Path, place: str) -> list[str]:
-    """Return the missing inputs of a step; empty without a seal."""
+    """Return the missing inputs of a step, by path below the results; empty without a seal."""
     try:
         inputs = read_seal(results, place).inputs
     except (FileNotFoundError, SealError):
@@ -189,7 +189,7 @@ def read_seal(results: Path, place: str) -> Seal:
         seal = _SEAL.validate_json(text, strict=True)
         names = map(PurePosixPath, (*seal.inputs, *seal.outputs))
         if any(name.is_absolute() or ".." in name.parts for name in names):
-            raise ValueError("no seal")
+            raise ValueError("a path leads out of the results")
     except FileNotFoundError:
         raise
     except OSError as error:

@@ -24,7 +24,7 @@ def escape_invisible(text: str) -> str:
 
 
 def escape_cell(text: str) -> str:
-    """Return `escape_invisible` of a text, so that no spreadsheet takes its cell for a formula."""
+    """Return a text with invisible characters and formulas escaped, for a spreadsheet's cell."""
     return _FORMULA.sub(r"\1'\2", escape_invisible(text))
 
 

@@ -99,8 +99,8 @@ def find_deterministic_signals(
     """Return the steps, warm-ups and periodic drift in a log; none if it is too short.
 
     ``blocks`` returns the log in order, in SI, NaN where a sample is missing; ``segments`` are the
-    first and one-past-last sample of each; ``highest`` is the highest frequency without effect of
-    a filter, Hz.
+    first and one-past-last sample of each segment; ``highest`` is the highest frequency, Hz, at
+    which a filter has no effect.
     """
     means = average_blocks(blocks(), samples, rate, segments)
     ordinates = Ordinates(means, highest) if means.parts else None

@@ -22,7 +22,7 @@ _MAX_PAUSES = 48  # with more, samples are lost, and the sensor does not restart
 _MAX_GAP_FRACTION = 1 / 5  # fraction of a segment; a longer gap splits it
 _SECTIONS = 16
 _MIN_SECTION_BLOCKS = 16  # blocks that each section needs for the test of stationarity
-_MIN_SIGMAS = 4.5  # of a trend, with 14 degrees of freedom: a false alarm in 2000 logs
+_MIN_SIGMAS = 4.5  # of a trend, with 14 degrees of freedom: one false alarm in 2000 logs
 _MIN_RELATIVE_TREND = 0.02  # smallest relative change of N over the log that is reported
 
 
@@ -62,7 +62,7 @@ class Means:
 def average_blocks(
     blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
-    """Return the block means of a log in consecutive blocks, SI, NaN where a sample is missing."""
+    """Return the block means of a log, given in parts in order, SI, NaN for missing samples."""
     spans = list_spans(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MAX_BLOCKS), min(_MIN_BLOCK_SAMPLES, max(total // _MIN_BLOCKS, 1)))
@@ -159,7 +159,7 @@ class Stationarity:
 
 
 def assess_stationarity(means: Means) -> Stationarity | None:
-    """Return the change of the fast noise over the longest part; None if short or constant."""
+    """Return the trend of the fast noise over the longest part; None if it cannot be tested."""
     part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _MIN_SECTION_BLOCKS or means.block < 2:

@@ -88,7 +88,7 @@ class Fit:
 
 
 class Ordinates:
-    """The ordinates of all parts of a log, used up to ``highest``, Hz, by default all."""
+    """The DCT-II coefficients of all parts of a log; fits use them up to ``highest``, Hz."""
 
     def __init__(self, means: Means, highest: float | None = None) -> None:
         self.means = means
@@ -114,7 +114,7 @@ class Ordinates:
         return int(self.used.sum()) >= 64 and float(np.ptp(self.coefficient)) > 0.0
 
     def part(self, number: int) -> slice:
-        """Return the ordinates of a part."""
+        """Return the slice of the ordinates of a part."""
         return slice(int(self.starts[number]), int(self.starts[number + 1]))
 
     def columns(self, regressor: Regressor) -> Array:
@@ -144,12 +144,12 @@ class Ordinates:
 
     @cached_property
     def whittle(self) -> Whittle:
-        """The likelihood of the coefficients as they are."""
+        """The likelihood of the coefficients, without regressors."""
         spectrum = self.spectrum(self.coefficient, np.ones_like(self.length))
         return make_whittle(spectrum, float(self.frequency[self.used].max()), COARSE)
 
     def fit_noise(self, residual: Array, leverage: Array | float = 0.0) -> tuple[Maximum, Array]:
-        """Return the noise model of coefficients less regressors, and its density, shape (k,)."""
+        """Return the noise model of a residual, shape (k,), and its density, shape (k,)."""
         weight = np.maximum(np.ones_like(residual) - leverage, _MIN_WEIGHT)
         noise = self.whittle.of(self.spectrum(residual, weight)).maximum(NOISE_TERMS)
         return noise, self.density(noise)
@@ -208,7 +208,7 @@ class Ordinates:
 
 
 def solve_weighted(columns: Array, weight: Array, coefficient: Array) -> tuple[Array, Array, Array]:
-    """Return amplitudes of columns (p, k), their covariance, and products with coefficients."""
+    """Return weighted least squares amplitudes (p,), covariance (p, p) and right side (p,)."""
     weighted = columns * weight
     gram = weighted @ columns.T
     norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))

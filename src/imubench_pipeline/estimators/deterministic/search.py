@@ -45,11 +45,11 @@ class Score:
 
     regressor: Regressor
     gain: float  # twice the log likelihood that it adds, for given noise
-    threshold: float  # what it must reach (`FALSE_ALARM_PROBABILITY`)
+    threshold: float  # least gain that is not noise (`FALSE_ALARM_PROBABILITY`)
 
 
 class Gain:
-    """Gain of log likelihood by more regressors of a part, in noise of a density (k,), SI²/Hz."""
+    """Computes the gain of log likelihood by one more regressor in a part, for given noise."""
 
     def __init__(
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int
@@ -86,7 +86,7 @@ class Gain:
         return np.where(good, np.sum(target * solved, axis=1), 0.0)
 
     def of_steps(self) -> tuple[Array, float]:
-        """Return the gain of a step before each block but the first, and the independent places."""
+        """Return the gains of steps before blocks 1 to n - 1, and how many are independent."""
         n = self._size
         k = np.arange(1, n)
         slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
@@ -141,10 +141,10 @@ def list_restarts(means: Means) -> list[Regressor]:
 
 
 def compute_threshold(chance: float, places: float) -> float:
-    """Return the threshold for the largest of the gains at a number of independent places.
+    """Return the threshold that the largest gain of noise exceeds with probability ``chance``.
 
-    S. O. Rice, Bell Syst. Tech. J. 24, 1945: a Gaussian process crosses a level z upwards at the
-    rate exp(-z^2 / 2), and the gain is z^2.
+    ``places`` is the number of independent places. A Gaussian process crosses a level z upwards at
+    the rate exp(-z^2 / 2), and the gain is z^2 (S. O. Rice, Bell Syst. Tech. J. 24, 1945).
     """
     return 2.0 * math.log(max(places, 1.0) / chance)
 
@@ -174,13 +174,13 @@ def _tabulate(n: int) -> list[tuple[RegressorKind, Array, Array]]:
 
 MAX_REGRESSORS = 16  # besides restarts; a log with more of them has telegraph noise
 _HELD_OUT_ORDINATES = 16  # lowest ordinates to which the noise is extrapolated instead of fitted
-_MIN_SCORE = 0.5  # of the threshold; weaker candidates are not tested with refitted noise
-_MIN_KEPT_GAIN = 12.0  # of a regressor in the final fit, given the regressors found later
+_MIN_SCORE = 0.5  # share of the threshold; weaker candidates are not tested with refitted noise
+_MIN_KEPT_GAIN = 12.0  # least gain of a regressor in the final fit, given later regressors
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Result of a search."""
+    """Result of the search for deterministic signals."""
 
     fit: Fit  # noise and regressors; ramps among them
     gains: tuple[float, ...]  # twice the log likelihood that is lost without each regressor
@@ -245,7 +245,7 @@ def _find_candidates(
 def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
-    """Optimise the place, time constant or frequency of one regressor, in given noise."""
+    """Return regressors with place, time constant or frequency of one of them optimised."""
     best = regressors[which]
     n = ordinates.sizes[best.part]
     steps = {"step": 0.5, "exponential": 0.12 * best.where, "sinusoid": 0.125 / n}

@@ -16,7 +16,7 @@ from imubench_pipeline.words.findings.base import SLOW, WHITE, FindingData
 _KINDS = {
     kind.code: kind for kind in (changes.BiasStep, changes.WarmUpDrift, changes.PeriodicDrift)
 }
-_MIN_EFFECT = 0.1  # of the interval of a value, or of the mean
+_MIN_EFFECT = 0.1  # least effect, over the interval of a value or over the mean
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,9 @@ def state_effects(
 ) -> tuple[Finding, ...]:
     """Return findings that state how parameters would change without the removal of signals.
 
-    A signal that changes no value by more than a tenth of its interval casts no doubt. ``without``:
-    values of `imubench_pipeline.estimators.robust.fit.fit_values` from the log with all signals;
-    ``mean``: of the log, SI.
+    A signal that changes no value by more than a tenth of its interval casts no doubt. ``without``
+    are the values of `imubench_pipeline.estimators.robust.fit.fit_values` from the log with all
+    signals; ``mean`` is the mean of the log, SI.
     """
     known = {**estimate.parameters, **estimate.curve}
     factors = {}

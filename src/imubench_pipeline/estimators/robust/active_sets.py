@@ -24,7 +24,7 @@ TERMS = 5
 
 _GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation time must bring
 _GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
-_MAX_PROFILE_LOSS = 3.84  # Of chi-squared at 95 % limits
+_MAX_PROFILE_LOSS = 3.84  # Increase of chi-squared at 95 % limits
 _RIDGE = 1e-12  # Relative, for collinear columns
 
 
@@ -46,7 +46,10 @@ class Solutions:
 
 
 class TermSearch:
-    """Search for the best set of terms at tau, averaged, (m,), and times, (t,), s; rate in Hz."""
+    """Searches for the best set of noise terms of Allan variances at ``tau``, s, shape (m,).
+
+    ``averaged``, (m,), are samples per cluster; ``times``, (t,), the T_B to try, s; rate in Hz.
+    """
 
     def __init__(self, tau: Array, rate: float, averaged: Array, times: Array) -> None:
         self.times = times
@@ -71,7 +74,7 @@ class TermSearch:
         return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
 
     def exclude(self, term: int) -> "TermSearch":
-        """Return the search among the sets without a term."""
+        """Return a search among the sets that do not contain a term."""
         search = copy(self)
         search._gains = np.where(self._masks[:, term], np.inf, self._gains)
         return search

@@ -71,24 +71,24 @@ _MIN_POINTS = 6
 _DRAWS = 400
 _CORRELATION_TIMES = 80
 _MAX_MODEL_ERROR = 0.01  # Relative, of a variance
-_DECADES_OF_MODEL_ERROR = 0.4  # Over which errors of the model are correlated
-_LINE_ERROR = 0.3  # Of the variance of a line: lines are neither constant nor single
-_MAX_LINE_SHARE = 0.98  # Of a variance that may be lines
+_DECADES_OF_MODEL_ERROR = 0.4  # Decades of tau over which errors of the model are correlated
+_LINE_ERROR = 0.3  # Relative error of a line's variance: lines are neither constant nor single
+_MAX_LINE_SHARE = 0.98  # Share of a variance that may be lines
 _MAX_BEND = 2.0  # Largest standardised residual of the first points that are fitted
 _BENT_POINTS = 6
-_MIN_RAMP = 3.0  # Of a ramp, in standard deviations of the slope of a random walk
+_MIN_RAMP = 3.0  # Least ramp, in standard deviations of the slope of a random walk
 _GAIN_OF_BEND = 4.0  # Decrease of chi-squared by a correction of the short end
-_MAX_CORRECTION = 0.15  # Of the first variance by a filter; at shorter tau it has another shape
-_MAX_RELATIVE_ERROR = 1.0  # Of a variance
-_MIN_EIGENVALUE = 0.02  # Of the correlation matrix that whitens
+_MAX_CORRECTION = 0.15  # Of the first variance, by a filter; at shorter tau the shape differs
+_MAX_RELATIVE_ERROR = 1.0  # Relative error of a variance
+_MIN_EIGENVALUE = 0.02  # Eigenvalue of the correlation matrix that whitens
 _ROUNDS = 4
-_MIN_FLOOR_SLOPE = -0.25  # Of the deviation at its lowest point, where it has reached its floor
+_MIN_FLOOR_SLOPE = -0.25  # Least slope at a lowest point that counts as the floor
 _PROFILE_POINTS = 60
 _MIN_DURATION_OF_WALK = 600.0  # s; in less, a process of some seconds passes for a walk
 _TIMES_OF_MINIMUM = 120
-_MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
-_MAX_SHARE_WITHOUT_MINIMUM = 0.025  # Of the draws
-_MIN_DECREASE = 0.5  # of a residual that ends the search for the first point
+_MAX_DOUBTFUL_RATIO = 10.0  # Ratio of limits, up to which a bias or lowest point has a value
+_MAX_SHARE_WITHOUT_MINIMUM = 0.025  # Share of the draws, above which tau_min has no value
+_MIN_DECREASE = 0.5  # Least decrease of the residual by a later first point
 _MAX_EXCESS = 1.0  # Variance of a logarithm between parts: nothing is identified beyond
 
 
@@ -102,10 +102,10 @@ def fit(
     """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
 
     ``curve`` and ``parts`` have the same m points, SI and s, without deterministic signals;
-    ``lines`` are spectral lines. Returns SI values with 95 % limits: sampling, choice of
-    terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
-    upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
-    than six points lie within a sixth of the log, or the variance is 0 at one.
+    ``lines`` are spectral lines. The values are in SI; their 95 % limits include sampling, choice
+    of terms, error of the model, and changes of the sensor within the log. A term that may be
+    absent, or has too wide limits, is ``not_identified``, with an upper limit. Raises
+    UnfitCurveError if fewer than six points lie within a sixth of the log, or a variance is 0.
     """
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))

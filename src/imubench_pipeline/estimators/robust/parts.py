@@ -27,28 +27,22 @@ LONGEST_OF_PARTS = 1 / 15
 """Longest tau at which parts are compared, as a part of the log: 2.5 clusters in a part."""
 
 _DIVISIONS = (2, 3, 6)
-_SIGNIFICANCE = 0.95  # Of an excess that counts
+_SIGNIFICANCE = 0.95  # Quantile of chi-squared above which an excess counts
 
 
 @dataclass(frozen=True)
 class PartVariances:
-    """Allan variances of equal parts of a log at the cluster sizes of its curve.
+    """Allan variances of equal parts of a log at the cluster sizes of its curve."""
 
-    Attributes
-    ----------
-    squares, terms : ndarray, shape (PARTS, m)
-        Sums of squared differences of cluster means, and their number; 0 where a part is too short.
-    """
-
-    squares: Array
-    terms: Array
+    squares: Array  # (PARTS, m): sums of squared differences of cluster means
+    terms: Array  # (PARTS, m): number of these differences; 0 where a part is too short
 
     def select(self, points: NDArray[np.bool_]) -> "PartVariances":
-        """Return those at some points of the curve."""
+        """Return the sums at the points of a mask, shape (m,)."""
         return PartVariances(self.squares[:, points], self.terms[:, points])
 
     def divide(self, number: int) -> Array:
-        """Return the variances of a number of equal parts, shape (number, m); NaN where unknown."""
+        """Return the variances of 1, 2, 3 or 6 equal parts, shape (number, m); NaN if unknown."""
         squares, terms = (
             sums.reshape(number, PARTS // number, -1).sum(axis=1)
             for sums in (self.squares, self.terms)
@@ -94,8 +88,8 @@ def estimate_excess(
     """Return the variance of the logarithm of a parameter between parts, beyond sampling errors.
 
     ``influence``, shape (m,), are the derivatives of the logarithm of the parameter by the
-    logarithms of the variances; ``covariance`` returns the covariance of the relative variances of
-    a log of a number of samples.
+    logarithms of the variances; ``covariance`` returns, for a number of samples, the covariance of
+    the relative variances of a log of this length.
     """
     excesses = []
     for number in _DIVISIONS:

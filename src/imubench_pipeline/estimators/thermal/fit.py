@@ -22,8 +22,8 @@ from imubench_pipeline.words.reasons import estimates as texts
 
 _MIN_EXTRA_GAIN = 6.0  # least gain of log likelihood beyond BIC, by the square or by settling
 _SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)  # times of settling, over the log
-_MAX_RAMP_FRACTION = 0.95  # of the information on s that a ramp shares; above it they are confused
-_MAX_LAG_WIDTH = 0.5  # of the interval of a lag that has a value, over the longest lag
+_MAX_RAMP_FRACTION = 0.95  # share of the information on s that a ramp has too; above: confused
+_MAX_LAG_WIDTH = 0.5  # width of the interval of a lag that has a value, over the longest lag
 
 
 @dataclass(frozen=True)

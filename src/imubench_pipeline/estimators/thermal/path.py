@@ -47,7 +47,7 @@ class Readings:
 
 
 def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
-    """Return block means of readings, °C, NaN where missing; raises ValueError if all are."""
+    """Return readings, °C, NaN where missing, averaged in blocks; ValueError if none is present."""
     width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
     begins = [np.arange(start, stop, width) for start, stop in segments]
     begin = np.concatenate(begins)
@@ -68,7 +68,7 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
             levels = np.union1d(levels, chosen)
     present = int(count.sum())
     if present == 0:
-        raise ValueError("no temperature is present")
+        raise ValueError("the log has no reading of the temperature, expected one or more")
     for first, last in pairwise(np.cumsum([0, *(len(part) for part in begins)])):
         if not count[first:last].any():  # a segment without readings has no effect
             total[first], count[first] = total.sum() / present, 1
@@ -92,7 +92,7 @@ def estimate_resolution(levels: Array, present: int) -> float:
     """Return the least significant bit of a register from its distinct readings, °C; 0: unknown.
 
     It is the smallest gap between the levels, shape (n,), ascending, if all gaps are multiples of
-    it within decimal rounding, and enough of the readings ``present`` are repeated.
+    it within decimal rounding, and the ``present`` readings repeat each level often enough.
     """
     if len(levels) < 2 or present < _MIN_READINGS_PER_LEVEL * len(levels):
         return 0.0
@@ -129,7 +129,7 @@ def _compute_chance(gaps: Array, step: float) -> float:
 
 
 DRAWN_PATHS = 24  # paths drawn around the most likely one
-_LOG_DENSITIES = (-16.0, 4.0)  # of the walk, over the squared range of the readings
+_LOG_DENSITIES = (-16.0, 4.0)  # log10 of the walk's density over the squared range of the readings
 _MIN_CELL_FRACTION = 0.5
 """Fraction of blocks with readings of one level; if fewer, noise averages the steps."""
 
@@ -173,7 +173,7 @@ class TemperaturePath:
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return means over ``count`` blocks from a first sample, of values at the knots, (k,)."""
+        """Return means, (count,), over blocks from a first sample, of values at knots, (k,)."""
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
         # The integral from the first edge; flat beyond the first and the last knot.

@@ -20,7 +20,7 @@ from imubench_pipeline.typing import Array
 LAGS = 16  # lags of a scan
 _MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0  # s
-_ROUNDS = 3  # of effect and noise; more change nothing in benchmarks/temperature.py
+_ROUNDS = 3  # rounds of effect and noise; more change nothing in benchmarks/temperature.py
 _FINE_LAGS = 48
 _MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not in the fine scan
 _MIN_OTHER_NOISE = 1e-3  # least fraction of the density that is not random walk
@@ -76,14 +76,14 @@ class Regression:
         self.bins = len(ordinates.whittle.spectrum.density)
 
     def means(self, knots: Array) -> Array:
-        """Return the mean in each block of the log of a signal at the knots of the path."""
+        """Return the block means of a signal whose values are given at the knots of the path."""
         parts = zip(self.ordinates.means.parts, self.ordinates.sizes, strict=True)
         return np.concatenate(
             [self.path.means(part.start, self.block, size, knots) for part, size in parts]
         )
 
     def transform(self, means: Array) -> Array:
-        """Return the coefficients, shape (..., k), of signals by their means in the blocks."""
+        """Return the DCT-II coefficients, shape (..., k), of signals from their block means."""
         parts = np.split(means, np.cumsum(self.ordinates.sizes)[:-1], axis=-1)
         transformed = [scipy.fft.dct(part, type=2, norm="ortho")[..., 1:] for part in parts]
         return np.concatenate(transformed, axis=-1)
@@ -140,11 +140,11 @@ class Regression:
 
     @cached_property
     def plain(self) -> tuple[Maximum, Array]:
-        """The noise of the log as it is, and its density at each ordinate."""
+        """The noise of the log without a temperature effect, and its density at each ordinate."""
         return self.ordinates.fit_noise(self.ordinates.coefficient)
 
     def fit(self, shape: Shape, lags: Array) -> Effect:
-        """Return a fit by turns of effect and noise, at the best of lags, shape (l,), s."""
+        """Fit effect and noise in turns, at the best of ``lags``, shape (l,), s."""
         density = self.plain[1]
         for _ in range(_ROUNDS):
             gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]
@@ -211,7 +211,7 @@ class Regression:
         )
 
     def path_errors(self, effect: Effect) -> Array:
-        """Return the changes of beta and the lag by the errors of the drawn paths, (d, p + 1)."""
+        """Return changes of beta and lag due to errors of the drawn paths, shape (d, p + 1)."""
         knots = self.knots(effect.lag)
         slope = np.full(len(knots), effect.beta[0])
         if effect.shape.quadratic:

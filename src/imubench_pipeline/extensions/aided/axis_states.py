@@ -38,8 +38,8 @@ def make_axis_states(
 ) -> AxisStates:
     """Return the states of a noise model at a sampling rate, Hz.
 
-    ``turn_on`` is the standard deviation of the turn-on bias, rad/s or m/s^2. From the tau
-    ``shortest`` to ``longest``, s, a bank of processes represents flicker noise.
+    ``turn_on`` and ``scale`` are standard deviations of turn-on bias, SI, and relative scale-factor
+    error. Processes represent flicker noise from the tau ``shortest`` to ``longest``, s.
     """
     terms = model.realised(shortest, longest)
     spaces = [term.state_space(1.0 / sampling) for term in terms]
@@ -47,7 +47,7 @@ def make_axis_states(
 
 
 def add_turn_on_bias(space: StateSpace, turn_on: float) -> StateSpace:
-    """Return a state space with a turn-on bias, standard deviation in SI, in its walk if any."""
+    """Add a turn-on bias, standard deviation in SI, to the random walk, or as a new state."""
     space = space.of_either_sign() if np.any(space.initial_mean) else space
     for i in range(len(space.output)):
         alone = np.zeros(len(space.output))
@@ -84,7 +84,7 @@ class StackedStates(NamedTuple):
 def stack_axes(
     axes: Sequence[AxisStates], sampling: float, width: int, steps: int
 ) -> StackedStates:
-    """Return the states of six axes over steps of ``width`` samples, at a sampling rate in Hz."""
+    """Stack six axes over ``steps`` steps of ``width`` samples between fixes, at a rate in Hz."""
     T = 1.0 / sampling
     spaces = [axis.space for axis in axes]
     whole = StateSpace.together(spaces)

@@ -78,7 +78,7 @@ def run_filter(
     axes: StackedStates,
     width: int,
 ) -> tuple[Array, Array, Array, Array]:
-    """Filter one run; p, v and C are changed in place.
+    """Run the filter once on all readings and fixes; p, v and C are changed in place.
 
     ``rate`` and ``force``, shape (L, 3), are readings every T s, ``earth``, (3,), the Earth's rate.
     ``fixes``, (E, 7), are position, velocity and heading of GNSS at the end of each epoch, used

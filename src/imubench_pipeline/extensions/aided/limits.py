@@ -27,7 +27,7 @@ def yield_outage_rows(
     recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],
 ) -> Iterator[OutageErrorRow]:
-    """Yield the rows of the outage limits, for every sensor with static recordings."""
+    """Yield a row for each limit in outages and each sensor with static recordings."""
     runs: dict[tuple[Any, ...], NavigationRow] = {}
     for row in NavigationRow.rows_of(navigation):
         if row.recommended and row.signals != "log" and row.position is not None:

@@ -90,7 +90,7 @@ _MAX_SHARE_ERROR = 0.05  # of a consistent filter, including two standard errors
 
 
 def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
-    """Return models of all six channels; a missing axis takes one of the same quantity."""
+    """Return models of all six channels; a missing axis gets another one of its quantity."""
     return {channel: models[lent] for channel, lent in lend_axes(models).items()}
 
 
@@ -104,7 +104,7 @@ def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
 def collect_tunings(
     folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
-    """Return tunings by name, with ``stand_in`` channels, and why others lack; horizon in s."""
+    """Return models of each tuning, with ``stand_in``, and why others are missing; horizon in s."""
     every = read_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named = _make_printed_models(sensor, declared)
@@ -194,7 +194,7 @@ class _Source:
 
 
 def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[NavigationRow]:
-    """Yield the rows of the table ``navigation`` of a sensor, of its longest usable recording."""
+    """Yield the rows of the table ``navigation`` for a sensor's longest usable recording."""
     sections = json.loads(settings)
     how = NavigateSettings.model_validate(sections["navigate"])
     how = _add_requirements(how, sections["asked"])

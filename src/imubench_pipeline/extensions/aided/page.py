@@ -39,7 +39,7 @@ _MIN_RELEVANT_RATIO = 1.1  # error over the error of the true model from which a
 
 @dataclass(frozen=True)
 class TuningAnswer:
-    """Whether the tuning matters; ``row`` is any one of the sensor, trajectory and signals."""
+    """Texts on whether the tuning matters for a sensor, a trajectory and a source of signals."""
 
     row: NavigationRow
     signals: str
@@ -51,7 +51,7 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class NavigationLine:
-    """A row as the page shows it."""
+    """A row of the table ``navigation``, with its texts on the page."""
 
     row: NavigationRow
     outage: str
@@ -158,7 +158,7 @@ def _describe_effect(rows: Sequence[NavigationRow]) -> str:
 
 
 def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[tuple[int, NavigationLine, list[str]]]:
-    """Yield place, line and overlapping sensors by the error after the longest outage."""
+    """Rank sensors by the error after the longest outage; yield rank, line and tied sensors."""
     for trajectory in dict.fromkeys(row.trajectory for row in rows):
         chosen = [
             row
@@ -180,7 +180,7 @@ def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[tuple[int, Navigatio
 
 
 def describe_row(row: NavigationRow) -> NavigationLine:
-    """Return a row as the page shows it."""
+    """Return a row of the table ``navigation`` with its texts on the page."""
     inside, error = row.nees_inside, row.nees_error
     return NavigationLine(
         row=row,

@@ -7,7 +7,7 @@ from imubench_pipeline.run.plan import Plan, to_json
 
 
 def list_navigated_sensors(plan: Plan) -> list[str]:
-    """Sensors with static recordings that the settings select for navigation."""
+    """Return the sensors with static recordings that the settings select for navigation."""
     of = plan.run.section(NavigateSettings).of
     return [
         sensor
@@ -18,7 +18,7 @@ def list_navigated_sensors(plan: Plan) -> list[str]:
 
 
 def dump_navigate_settings(plan: Plan, sensor: str) -> str:
-    """Return the settings of the navigation of a sensor."""
+    """Return, as JSON, the settings of the navigation runs of a sensor."""
     declared = plan.sensors.get(sensor)
     return to_json(
         {

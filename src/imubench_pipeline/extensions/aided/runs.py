@@ -45,7 +45,7 @@ class Outcome:
 
 
 class Drive:
-    """A trajectory for runs of several tunings, without fixes in outages: begin and length, s."""
+    """A trajectory with outages of GNSS (begin and length, s), on which filters are run."""
 
     def __init__(self, trajectory: Trajectory, outages: Sequence[tuple[float, float]]) -> None:
         self.trajectory = trajectory
@@ -146,7 +146,7 @@ Interval = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Share:
-    """A share of the epochs and its standard error, at least from the scatter of the runs."""
+    """A fraction of the epochs, with its standard error from the scatter of the runs or more."""
 
     value: float
     error: float
@@ -162,14 +162,14 @@ def select_epochs(drive: Drive, length: float | None) -> NDArray[np.bool_]:
 
 
 def compute_mean_squares(drive: Drive, outcome: Outcome, error: str, length: float | None) -> Array:
-    """Return the mean square of an error at the end of outages (None: at all fixes), shape (R,)."""
+    """Return mean squares of an error after outages of a length, s (None: at fixes), shape (R,)."""
     return _average_epochs(drive, outcome.errors[:, :, ERRORS[error]] ** 2, length)
 
 
 def predict_root_mean_square(
     drive: Drive, outcome: Outcome, error: str, length: float | None
 ) -> float:
-    """Return the root mean square of an error by the variances of the filter."""
+    """Return the root mean square of an error that the variances of the filter predict."""
     return math.sqrt(_average_epochs(drive, outcome.variances[:, :, ERRORS[error]], length).mean())
 
 
@@ -190,7 +190,7 @@ def compute_root_mean_square(of_runs: Array) -> Interval:
 
 
 def compute_ratio(of_runs: Array, others: Array) -> Interval:
-    """Return the ratio of two such roots of the same runs, shapes (R,)."""
+    """Return the ratio of two rms errors with limits, from mean squares of runs, shapes (R,)."""
     square = float(of_runs.mean() / others.mean())
     return _compute_interval(math.sqrt(square), (of_runs - square * others) / of_runs.mean())
 

@@ -37,7 +37,7 @@ class NavigateSettings(Strict):
     outages: tuple[Outage, ...] = Field(
         ("10 s", "30 s", "60 s"),
         min_length=1,
-        description="durations durations without GNSS, one after the other",
+        description="durations without GNSS, one after the other",
     )
     duration: _Drive = Field(
         "310 s",

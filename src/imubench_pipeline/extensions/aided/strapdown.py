@@ -28,7 +28,7 @@ GRAVITY_GRADIENT = (
 
 @njit(cache=True, nogil=True)
 def write_rotation(x: float, y: float, z: float, into: Array) -> None:
-    """Write the matrix of a turn by a vector in rad, shape (3, 3): exp([r x])."""
+    """Write the matrix exp([r x]), shape (3, 3), of the rotation vector r = (x, y, z), rad."""
     square = x * x + y * y + z * z
     if square > 1e-8:
         angle = math.sqrt(square)

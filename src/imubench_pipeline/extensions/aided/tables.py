@@ -27,7 +27,7 @@ class NavigationRow(SensorRow):
     states: Annotated[int | None, "number, with position, velocity and attitude"] = None
     signals: Annotated[str | None, "source of the errors: truth, estimate or log"] = None
     assumed: Annotated[str | None, "from another sensor, as this log lacks it"] = None
-    runs: Annotated[int | None, "index of the run"] = None
+    runs: Annotated[int | None, "number of runs"] = None
     outages: Annotated[int | None, "number of outages of this length in all runs"] = None
     position: Annotated[float | None, _rms("in the plane"), "m"] = None
     position_lower: Annotated[float | None, _LOWER, "m"] = None

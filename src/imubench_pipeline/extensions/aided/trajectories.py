@@ -132,7 +132,7 @@ TRAJECTORY_NAMES = tuple(_MOTIONS)
 
 
 def simulate_trajectory(name: str, duration: float, sampling: float) -> Trajectory:
-    """Return a trajectory of `TRAJECTORY_NAMES`, with a length in s, at a rate in Hz."""
+    """Return a trajectory of `TRAJECTORY_NAMES`; ``duration`` in s, ``sampling`` in Hz."""
     moves, gnss = _MOTIONS[name]
     time = np.arange(round(duration * sampling) + 1) / sampling
     motion = moves(time, sampling)
@@ -161,7 +161,7 @@ class Spreads:
         return self.gyro_bias if channel.startswith("gyro") else self.accel_bias
 
     def scale(self, channel: str) -> float:
-        """Return the standard deviation of its relative scale-factor error."""
+        """Return the standard deviation of the relative scale-factor error of a channel."""
         return self.gyro_scale if channel.startswith("gyro") else self.accel_scale
 
 

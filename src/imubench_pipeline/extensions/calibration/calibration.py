@@ -71,8 +71,8 @@ def make_calibration_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
-    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
-    of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
+    `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
+    `settings`: of `run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
     tables: dict[str, list[TableRow]] = {name: [] for name in CALIBRATED}
     logs = load_logs(folder)
@@ -233,12 +233,12 @@ def _average_positions(
             break
         dwells.append(Dwell(round(start * rate), stop, 1))
     if len(dwells) < 2:
-        raise ValueError(f"{len(dwells)} positions are in the log; expected two or more")
+        raise ValueError(f"the log has {len(dwells)} complete positions; expected two or more")
     experiment = Experiment(tuple(dwells), rate, 0.0)
     longest = max(one.stop - one.start for one in dwells)
     measured = [block_means(log.blocks(), experiment, longest) for log in axes]
     if {len(one.blocks) for one in measured} != {len(dwells)}:
-        raise ValueError("too many samples of a position are missing")
+        raise ValueError("more than half of the samples of a position are missing")
     angles = np.zeros((len(dwells), 3))
     angles[:, 2] = [declared.angle(number) for number in range(len(dwells))]
     count = np.min([one.blocks.count for one in measured], axis=0)
@@ -371,7 +371,7 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
         if start < gyro.begins or stop > ends + 1.0 / log.rate:
             raise ValueError(
                 f"rate_table.steps: step {number} lasts from {start:g} to {stop:g} s; expected "
-                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: mend "
+                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: correct "
                 "the step, or 'use:' beside the log"
             )
         rate = parse_quantity(step.rate, "angular_rate")

@@ -25,7 +25,7 @@ _MIN_PRESENT_SHARE = 0.5  # of the samples of a block, or its mean is left out
 
 @dataclass(frozen=True)
 class Dwell:
-    """A time at rest in one position; ValueError without a sample, or for another sense."""
+    """Samples at rest in one position; ValueError without a sample, or if the sense is wrong."""
 
     # start, stop: first sample of the log, and the one past the last
     start: int
@@ -34,26 +34,27 @@ class Dwell:
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop:
-            raise ValueError(f"a dwell from sample {self.start} to {self.stop} holds no sample")
+            raise ValueError(f"a dwell from sample {self.start} to {self.stop} has no sample")
         if self.sense not in (1, -1):
             raise ValueError(f"sense is {self.sense}, expected 1 (north) or -1 (south)")
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Dwells in their order, else ValueError; so for a rate or a latitude out of range."""
+    """Dwells in order of time, rate and latitude; ValueError if out of order or range."""
 
-    dwells: Sequence[Dwell]  # at least one; of the same sense one after another for a missed turn
+    dwells: Sequence[Dwell]  # at least one; two of one sense in a row: a turn was missed
     rate: float  # sampling rate, Hz
     latitude: float  # rad
 
     def __post_init__(self) -> None:
         if not self.dwells:
-            raise ValueError("an experiment needs a dwell")
+            raise ValueError("an experiment has no dwells, expected at least one")
         for before, after in pairwise(self.dwells):
             if after.start < before.stop:
                 raise ValueError(
-                    f"a dwell begins at sample {after.start}, before the last ends at {before.stop}"
+                    f"a dwell begins at sample {after.start}, expected {before.stop} or later: the "
+                    "previous dwell ends there"
                 )
         if not (math.isfinite(self.rate) and self.rate > 0):
             raise ValueError(f"the rate is {self.rate} Hz, expected a frequency above 0")
@@ -73,7 +74,7 @@ class Experiment:
         latitude: float,
         first: int = 1,
     ) -> "Experiment":
-        """Return an experiment with dwells and turns in s, a rate in Hz, a latitude in rad."""
+        """Return dwells of equal length and alternate sense; arguments in s, Hz and rad."""
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
         return cls(
@@ -88,9 +89,9 @@ class Experiment:
         return sum(dwell.stop - dwell.start for dwell in self.dwells)
 
     def blocks(self, longest: int) -> "Blocks":
-        """Return the blocks of a complete log, of ``longest`` samples at most, from 1."""
+        """Divide the dwells of a log without gaps into blocks of at most ``longest`` samples."""
         if longest < 1:
-            raise ValueError(f"a block of {longest} samples is empty")
+            raise ValueError(f"longest is {longest}, expected at least 1 sample")
         edges = []
         for dwell in self.dwells:
             length = dwell.stop - dwell.start
@@ -143,7 +144,7 @@ class Blocks(SampleBlocks):
         return float(self.count.sum()) / self.rate
 
     def check_means(self, means: Array) -> None:
-        """Raise ValueError if the means are not finite, of shape (runs, b)."""
+        """Raise ValueError unless the means are finite and of shape (runs, b)."""
         if means.ndim != 2 or means.shape[1] != len(self):
             raise ValueError(
                 f"the means have the shape {means.shape}, expected {len(self)} columns"
@@ -152,7 +153,7 @@ class Blocks(SampleBlocks):
             raise ValueError("a block mean is not finite; leave its block out")
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Blocks":
-        """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
+        """Return the selected blocks; ``which``: a mask, shape (b,), indices, or a slice."""
         arrays = ("start", "stop", "count", "sense", "dwell")
         return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
@@ -181,13 +182,12 @@ class Measured:
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
-    """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
+    """Average a log over blocks of at most ``longest`` samples within dwells, in one pass.
 
     The mean is over the samples present; a block with more than half missing is left out. With a
     third of all samples missing, a standard deviation is right to 1 %, or 3 % too small for a
-    correlation time of two samples. The parts of the log are in order, rad/s, each ndarray of one
-    axis; NaN where a sample is missing. Raises ValueError if the log ends before the last dwell, or
-    has no such block.
+    correlation time of two samples. The parts of the log are in order, rad/s, shape (n,) each; NaN
+    where a sample is missing. ValueError if the log is too short, or all blocks are left out.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)
@@ -203,10 +203,10 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         total += np.bincount(place, weights=present, minlength=len(whole))
         count += np.bincount(place, minlength=len(whole))
     if length < whole.stop[-1]:
-        raise ValueError(f"the log has {length} samples, the last dwell ends at {whole.stop[-1]}")
+        raise ValueError(f"the log has {length} samples, expected {whole.stop[-1]} by the dwells")
     enough = count >= np.maximum(_MIN_PRESENT_SHARE * whole.count, 1)
     if not enough.any():
-        raise ValueError("no block has enough samples: all dwells are missing")
+        raise ValueError("no block has enough samples, expected half of a block or more")
     return Measured(
         replace(whole.chosen(enough), count=count[enough]),
         (total[enough] / count[enough])[None, :],

@@ -56,7 +56,7 @@ class Filtered:
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
-        """Return the NEES of rate, rad/s, and all states, (runs, b, m): (runs, b), chi^2(m + 1)."""
+        """Return the NEES, (runs, b), chi^2(m + 1), by the truth; ``states``: (runs, b, m)."""
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
         error[:, :, 1:] -= states
@@ -68,7 +68,7 @@ class Filtered:
 
 
 class RateFilter:
-    """The filter of one design: blocks and noise model. It filters any number of runs at once.
+    """A Kalman filter for the Earth's rate, from block means of any number of runs at once.
 
     ``turn_on_bias`` is the standard deviation of the fixed bias, ``rate_sigma`` of the prior of the
     rate about 0, both in rad/s and by default uninformative. Raises ValueError if one of them is
@@ -96,7 +96,7 @@ class RateFilter:
         return compute_deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
-        """Filter runs of one design from finite block means, rad/s, shape (runs, b)."""
+        """Filter runs from finite block means, rad/s, shape (runs, b)."""
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots

@@ -45,12 +45,12 @@ class NotObservable:
 
 
 class NotObservableError(ValueError):
-    """The data do not determine a requested quantity, however little noise they have."""
+    """Raised if the data would not determine a requested quantity even without noise."""
 
 
 @dataclass(frozen=True)
 class Estimated:
-    """A quantity in runs of one design, SI."""
+    """Estimates of a quantity in several runs, SI, with standard error and limits."""
 
     value: Array  # shape (runs,)
     sigma: float  # its standard error
@@ -63,7 +63,7 @@ class Estimated:
 def make_estimated(
     value: Array, sigma: float, noise_sigma: float | None = None, p_value: Array | None = None
 ) -> Estimated:
-    """Return estimates, shape (runs,), of normal errors with their limits."""
+    """Return estimates, shape (runs,), with 95 % limits for normal errors."""
     noise_sigma = sigma if noise_sigma is None else noise_sigma
     half = compute_half_width() * sigma
     return Estimated(value, sigma, noise_sigma, value - half, value + half, p_value)
@@ -71,7 +71,7 @@ def make_estimated(
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of generalised least squares for runs of one design."""
+    """Result of generalised least squares for runs with equal regressors."""
 
     value: Array  # shape (runs, p); estimates, SI
     covariance: Array  # shape (p, p); of their errors, by the noise model
@@ -92,14 +92,14 @@ class Fit:
 def compute_half_width(quantities: int = 1) -> float:
     """Return half of a two-sided 95 % interval, in standard deviations.
 
-    By Bonferroni, the intervals of several quantities all cover them with this probability.
+    For several quantities, 95 % is the probability that all intervals are right (Bonferroni).
     """
     level = 1.0 - (1.0 - _CONFIDENCE_LEVEL) / quantities
     return float(norm.ppf(0.5 + level / 2.0))
 
 
 class LeastSquares:
-    """The estimator of one design: blocks, noise model and regressors of shape (b, p).
+    """Generalised least squares for runs with equal blocks and regressors, shape (b, p).
 
     The model has some noise in every sample. ``further``, shape (b, b), is added to the covariance
     of the noise, (rad/s)^2. Raises NotObservableError if there are fewer blocks than regressors, or
@@ -126,7 +126,7 @@ class LeastSquares:
         white = solve_triangular(self._root, regressors, lower=True)
         length = np.linalg.norm(white, axis=0)
         if np.any(length == 0.0):
-            raise NotObservableError("a regressor is 0 throughout")
+            raise NotObservableError("a regressor is 0 in all blocks; its parameter has no effect")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
         if values[-1] < _MIN_SINGULAR_VALUE:
             raise NotObservableError("the data cannot separate the parameters")
@@ -136,11 +136,11 @@ class LeastSquares:
 
     @property
     def sigma(self) -> Array:
-        """Standard errors of the parameters; they need no data, shape (p,)."""
+        """Standard errors of the parameters, shape (p,), which do not depend on the data."""
         return np.sqrt(np.diag(self.covariance))
 
     def fit(self, means: Array) -> Fit:
-        """Estimate the parameters of runs of one design from finite means of shape (runs, b)."""
+        """Estimate the parameters of each run from finite block means of shape (runs, b)."""
         self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
         along = white @ self._basis
@@ -173,10 +173,10 @@ def choose_block_length(
 def halve_block_length(
     length: int, experiment: Experiment, sigma: Callable[[Blocks], ArrayLike], max_blocks: int
 ) -> int:
-    """Return a block length, in samples, halved until shorter blocks tell no more.
+    """Halve a block length, in samples, until shorter blocks give no more information.
 
-    A fourth of the returned length would lower none of the standard errors ``sigma`` of the blocks
-    by 0.1 %, or would give more than ``max_blocks`` of them.
+    A fourth of the returned length would lower none of the standard errors ``sigma`` by 0.1 %, or
+    would give more than ``max_blocks`` blocks. The function ``sigma`` takes the blocks.
     """
 
     @cache

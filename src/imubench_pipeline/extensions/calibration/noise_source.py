@@ -1,7 +1,7 @@
 """Choose the noise model for the weights of an Earth-rate experiment: the sensor at rest.
 
-The log of a turned gyro does not show its noise. The model is of the longest static recording of
-the same sensor, and device if possible, or else of the typical figures of its datasheet.
+The log of a turned gyro does not show its noise. The model is from the longest static recording of
+the same sensor, if possible of the same device, else from the typical figures of its datasheet.
 """
 
 from collections.abc import Collection, Sequence
@@ -91,9 +91,9 @@ def load_noise_at_rest(folders: Sequence[Path]) -> NoiseAtRest | None:
 
 
 def lend_axes(channels: Collection[str]) -> dict[str, str]:
-    """Return the channel that gives each axis its model: itself, or another of its quantity.
+    """Return for each axis the channel whose model it uses: its own, or another of the quantity.
 
-    A quantity without channels has none.
+    Axes of a quantity without channels are left out.
     """
     lent = {}
     for channel in CHANNELS:
@@ -107,10 +107,10 @@ def lend_axes(channels: Collection[str]) -> dict[str, str]:
 def find_noise_source(
     folder: Path, static: Sequence[Path], key: Key, sensor: Sensor, draws: int = 0
 ) -> NoiseSource | None:
-    """Return the noise of a gyro: `take_static_noise`, or else `take_printed_noise`.
+    """Return the noise of a gyro from a static recording, else from its datasheet, else None.
 
-    `folder`: of the turned recording; `static`: of the static recordings of its sensor; `draws`:
-    number of models drawn from the uncertainty of a static log.
+    `folder`: results of the turned recording; `static`: the same of the static recordings of its
+    sensor; `draws`: number of models drawn from the uncertainty of a static log.
     """
     own = Quality.read(folder / "quality.json").recording
     return take_static_noise(static, own, key.channel, draws) or take_printed_noise(

@@ -207,7 +207,7 @@ NOT_CALIBRATED = Section(
 
 
 def make_rest_section(site: Site, view: RecordingView) -> tuple[str, Mapping[str, object]] | None:
-    """Return the bias of a static recording for its page; None without a known direction."""
+    """Return template and data of the bias of a static recording; None without a direction."""
     rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
@@ -249,7 +249,7 @@ def group_by_run(site: Site) -> dict[str, list[CalibratedRun]]:
 
 
 def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[CalibrationLine]:
-    """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
+    """Yield lines with roll, pitch and heading in degrees, from the rows of one recording."""
     for row in rows:
         value, lower, upper, truth = (
             None if angle is None else math.degrees(angle)
@@ -283,7 +283,6 @@ def describe_noise_model(rows: Sequence[Estimated]) -> str:
 
 
 def _rate_table(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
     arrays, summary = Arrays(), []
@@ -323,7 +322,6 @@ RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     number = rows[0].rates if rows else None
     return {

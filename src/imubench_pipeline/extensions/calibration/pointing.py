@@ -45,7 +45,7 @@ class Pointing:
 
     @property
     def rate_sigma(self) -> float:
-        """Standard deviation of this rate by the uncertain direction, rad/s."""
+        """Standard deviation of `rate` due to the uncertain direction, rad/s."""
         mean, square = self._moments()
         return math.sqrt(max(square - mean**2, 0.0))
 
@@ -56,7 +56,7 @@ class Pointing:
 
     @property
     def tilt_sigma(self) -> float:
-        """Effect of the spread of the elevation at the worst heading, to the first order, rad/s."""
+        """Effect of ``elevation_sigma`` on the rate at the worst heading, first order, rad/s."""
         most = abs(math.cos(self.latitude) * math.sin(self.elevation))
         most += abs(math.sin(self.latitude) * math.cos(self.elevation))
         return EARTH_RATE * most * self.elevation_sigma

@@ -50,7 +50,7 @@ _RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up
 
 @dataclass(frozen=True)
 class Calibration:
-    """Bias and scale factor in runs of one design."""
+    """Bias, scale factor and linearity of a gyro on a rate table, in several runs."""
 
     line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
     bias: Estimated  # rad/s, with the uncertainty of the Earth's rate along the axis
@@ -74,8 +74,8 @@ def fit_rate_table(
 
     The blocks are of the schedule's `experiment`. Without a direction (``pointing``) the Earth's
     rate is a part of the bias. ``setting_sigma``, rad/s, is the standard deviation of the true rate
-    of each stretch. Raises NotObservableError for one rate; ValueError if the deviation is
-    negative, or the heading of an axis that is not vertical is missing.
+    of each stretch. Raises NotObservableError if there is only one rate; ValueError if the
+    deviation is negative, or the heading of an axis that is not vertical is missing.
     """
     if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
         raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")

@@ -24,10 +24,10 @@ def describe_static_noise(
     simulated: bool = False,
     channels: tuple[str, str] | None = None,
 ) -> str:
-    """Return the static recording from which a noise model is.
+    """Return a note on the static recording that a noise model comes from.
 
-    ``device``: of the recording if it is another one; ``channels``: the channel that is used, and
-    the channel without an estimate, if they differ.
+    ``device``: device of the recording, if another one; ``channels``: the channel that is used,
+    and the channel without an estimate, if they differ.
     """
     words = [f"static recording {recording}"]
     if device is not None:

@@ -17,7 +17,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Schedule:
-    """Steady rates of a table, in their order; ValueError if they are none, or do not match."""
+    """Steady rates of a rate table, in order of time; ValueError if they are not consistent."""
 
     stretches: Sequence[Dwell]  # samples of each; their sense is not used
     table_rates: Array  # shape (stretches,); with respect to the Earth, of the gyro's sign, rad/s
@@ -26,10 +26,10 @@ class Schedule:
     def __post_init__(self) -> None:
         if len(self.table_rates) != len(self.stretches):
             raise ValueError(
-                f"{len(self.table_rates)} table rates for {len(self.stretches)} stretches"
+                f"found {len(self.table_rates)} table rates, expected {len(self.stretches)}"
             )
         if not np.isfinite(self.table_rates).all():
-            raise ValueError("a table rate is not finite")
+            raise ValueError("a table rate is not finite, expected numbers in rad/s")
         _ = self.experiment  # stretches in order, and a sampling rate above 0
 
     @classmethod
@@ -46,8 +46,8 @@ class Schedule:
             first, last = (math.ceil(time * rate - 1e-6) for time in (start + settling, stop))
             if not 0 <= first < last:
                 raise ValueError(
-                    f"the step of {table_rate:g} rad/s from {start:g} to {stop:g} s holds no "
-                    f"sample after {settling:g} s of settling"
+                    f"the step of {table_rate:g} rad/s from {start:g} to {stop:g} s has no sample "
+                    f"after {settling:g} s of settling; expected a longer step"
                 )
             stretches.append(Dwell(first, last, 1))
         return cls(tuple(stretches), np.array([step[2] for step in steps]), rate)
@@ -56,12 +56,12 @@ class Schedule:
     def from_column(
         cls, column: Array, rate: float, *, tolerance: float, shortest: float, settling: float = 0.0
     ) -> "Schedule":
-        """Find the steady rates in a column with the table's rate, rad/s, shape (n,), in Hz.
+        """Find the steady rates in a column with the table's rate, rad/s, shape (n,).
 
-        A sample is steady if the column stays within the tolerance for half the shortest time, s,
-        about it; a stretch lasts that time and stays within twice the tolerance. The settling time,
-        s, at its start is left out. Raises ValueError for wrong arguments, or if there is no steady
-        rate.
+        A sample is steady if the column varies by at most ``tolerance`` in half of ``shortest``, s,
+        about it. A stretch lasts ``shortest`` or more, and varies by at most twice the tolerance;
+        ``settling``, s, at its start is left out. ``rate`` is the sampling rate, Hz. Raises
+        ValueError for wrong arguments, or without a steady rate.
         """
         if not tolerance >= 0:
             raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")

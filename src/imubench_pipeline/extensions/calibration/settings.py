@@ -29,16 +29,16 @@ _MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
     """Return the gyro of an experiment: the gyro stated in its notes, or the only one.
 
-    `what` completes "the gyro whose axis ..." of the error. Raises ValueError if it is not among
-    the channels of the log, or is not stated and the log has another number of gyros than one; the
-    text begins with the key.
+    `what` completes "the gyro whose axis ..." in the error. Raises ValueError if the stated gyro is
+    not in the log, or if none is stated and the log does not have exactly one; the error begins
+    with the key.
     """
     gyros = [name for name in channels if name.startswith("gyro_")]
     if stated in gyros:
         return stated
     in_log = ", ".join(gyros) or "no gyro"
     if stated is not None:
-        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
+        raise ValueError(f"channel: found {stated!r}; expected a gyro of the log: {in_log}")
     if len(gyros) != 1:
         raise ValueError(
             f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
@@ -47,7 +47,7 @@ def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
 
 
 class Direction(Strict):
-    """Where an axis points on the Earth."""
+    """The direction of an axis on the Earth."""
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
     heading: Angle | None = Field(None, description="of the axis, north to east; null: unknown")
@@ -67,7 +67,7 @@ class Direction(Strict):
 
     @property
     def pointing(self) -> Pointing:
-        """The same in rad."""
+        """The direction in rad."""
         angles = {
             name: parse_quantity(getattr(self, name), "angle")
             for name in ("latitude", "elevation", "heading_sigma", "elevation_sigma")
@@ -86,7 +86,7 @@ class AtRest(Direction, Experiment):
     )
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
-        """Return the channel of the log with a stated axis (see `stated_gyro`)."""
+        """Return the channel of the gyro with the stated direction (see `stated_gyro`)."""
         return stated_gyro(self.channel, channels, "points there")
 
 
@@ -162,11 +162,11 @@ class OnRateTable(Experiment):
         return self
 
     def si(self, name: str, dimension: str) -> float:
-        """Return one of its values in SI."""
+        """Return a setting in SI; ``dimension``: such as "time" or "angular_rate"."""
         return parse_quantity(getattr(self, name), dimension)
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
-        """Return the channel along the axis of the table; ``column`` or steps state the rates."""
+        """Return the channel along the table's axis; ``column``: whether the log has the rate."""
         if not self.steps and not column:
             raise ValueError(
                 "steps: missing; expected the steady rates, such as - {start: 0 s, end: 60 s, "
@@ -190,7 +190,7 @@ class Turned(Experiment):
     )
 
     def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
-        """Return one of its time settings, s."""
+        """Return a setting that is a time, s."""
         return parse_quantity(getattr(self, name), "time")
 
     @property
@@ -224,7 +224,7 @@ class InPositions(Turned):
         return self
 
     def angle(self, number: int) -> float:
-        """Return the angle of a position, from 0, to the first, rad; it grows from turn to turn."""
+        """Return the angle from the first position (number 0) to a position, rad, never wrapped."""
         angles = [parse_quantity(text, "angle") for text in self.turned]
         return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
 
@@ -238,7 +238,7 @@ class InPositions(Turned):
 
 
 class SimulatedTable(OnRateTable):
-    """A gyro on a rate table that keeps to its steps, with ramps between them."""
+    """A simulated gyro on a rate table that follows its steps, with ramps between them."""
 
     scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
@@ -276,7 +276,7 @@ class SimulatedRest(AtRest):
 
     @property
     def true(self) -> Pointing:
-        """Where the axis points, exactly."""
+        """The true direction of the axis."""
         stated, heading = self.pointing, self.pointing.heading
         if heading is None:
             heading = parse_quantity(self.true_heading, "angle")

@@ -59,7 +59,7 @@ def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) 
     """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
 
     ``attitude``, shape (3, 3), is of the first position; ``angle`` the turn from it about z, rad,
-    and ``turning`` its rate, rad/s, shape (n,). The turns are about the accelerometers.
+    and ``turning`` its rate, rad/s, shape (n,). Turns cause no acceleration of the accelerometers.
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = []

@@ -28,7 +28,7 @@ UNINFORMATIVE_SIGMA = 1.0  # of a prior, rad/s: 14,000 times the Earth's rate
 
 @dataclass(frozen=True)
 class Step:
-    """Transition from the states after one block to the states after the next, and its mean."""
+    """Transition from the states after a block to the next block: its mean, and states after it."""
 
     transition: Array  # shape (m + 1, m); the last row gives the mean of the block
     factor: Array  # shape (m + 1, m + 1); a root of the covariance of the noise
@@ -49,7 +49,7 @@ class BlockStates:
 def discretise_blocks(
     model: NoiseModel, blocks: Blocks, turn_on_bias: float = UNINFORMATIVE_SIGMA
 ) -> BlockStates:
-    """Return the states of a noise model over blocks.
+    """Return the states of a noise model, discretised exactly over blocks.
 
     Gauss-Markov processes start in their stationary distribution; a ramp has a slope of variance
     R^2, of either sign; a line's phase is not known; z_K starts with the standard deviation of the
@@ -103,7 +103,7 @@ def _build_step(space: StateSpace, gap: int, size: int) -> Step:
 
 
 class BlockFilter:
-    """The filter of one design; it filters any number of runs at once.
+    """A Kalman filter of the block means of several axes, for any number of runs at once.
 
     ``seen``, shape (b, a, p), is the sensitivity of the mean of each of a axes over each of b
     blocks to p constants; ``start``, shape (p, p), a root of their prior covariance. The roots have

@@ -37,7 +37,7 @@ _MIN_HEADING_SENSITIVITY = 1e-9  # least share of the rate that may depend on th
 
 @dataclass(frozen=True)
 class StillBias:
-    """The bias of a gyro from runs at rest of one design; limits cover an unknown heading."""
+    """The bias of a gyro from runs at rest; the limits include an unknown heading."""
 
     fixed: Estimated  # bias at the first sample of the first block, rad/s
     present: Estimated  # mean of bias and slow noise over the last block, rad/s

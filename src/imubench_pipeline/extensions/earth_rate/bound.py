@@ -26,10 +26,10 @@ MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
-    """Return L^-1 columns, shape (b, c), with L L^T the covariance of the block means of a model.
+    """Decorrelate columns of block means, shape (b, c): return L^-1 columns, same shape.
 
-    The model must have some noise in every sample. Raises ValueError if a mean has no noise, given
-    those before it.
+    L L^T is the covariance of block means of the model, which must have noise in every sample.
+    Raises ValueError if a mean has no noise, given the means before it.
     """
     states = discretise_blocks(model, blocks, turn_on_bias=0.0)
     innovations = _compute_innovations(
@@ -41,7 +41,7 @@ def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
         np.ascontiguousarray(columns),
     )
     if not np.isfinite(innovations).all():
-        raise ValueError(f"the noise model {model.name} leaves a mean without noise")
+        raise ValueError(f"the noise model {model.name} leaves a mean without noise; add N to it")
     return innovations
 
 
@@ -97,15 +97,15 @@ def compute_cramer_rao_bounds(
 ) -> Array:
     """Return the least standard deviation of the rate that the data up to each block allow.
 
-    In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
-    deviation of the bias, rad/s, is by default unknown. The model must have some noise in every
-    sample. Raises ValueError if the turn-on bias is negative, or NaN.
+    In rad/s, shape (b,); infinite where the rate and the bias are not separable. ``turn_on_bias``
+    is the standard deviation of the fixed bias, rad/s; infinity: unknown. The model must have noise
+    in every sample. Raises ValueError if the turn-on bias is negative, or NaN.
     """
     return convert_to_sigma(compute_information(blocks, model, turn_on_bias))
 
 
 def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
-    """Return the Fisher information of the rate, (rad/s)^-2, shape (b,), as in the bounds above."""
+    """Return the Fisher information of the rate, (rad/s)^-2, up to each block, shape (b,)."""
     if not turn_on_bias >= 0:
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
     white = whiten(model, blocks, np.column_stack([blocks.seen, np.ones(len(blocks))]))
@@ -119,7 +119,7 @@ def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float =
 
 
 def compute_final_bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return `compute_cramer_rao_bounds` at the end of a run, rad/s."""
+    """Return the Cramér-Rao bound of the rate at the end of a run, rad/s."""
     return float(compute_cramer_rao_bounds(blocks, model, turn_on_bias)[-1])
 
 
@@ -139,6 +139,6 @@ def choose_block_length(experiment: Experiment, model: NoiseModel) -> int:
 
 
 def convert_to_sigma(fisher: Array) -> Array:
-    """Return the standard deviations, rad/s, of information, 1/(rad/s)², shape (n,); maybe inf."""
+    """Return standard deviations, rad/s, from information, (rad/s)^-2, shape (n,); inf for 0."""
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / np.sqrt(fisher))

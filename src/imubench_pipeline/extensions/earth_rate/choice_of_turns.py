@@ -51,7 +51,7 @@ _KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
 
 @dataclass(frozen=True)
 class TurnSchedule:
-    """The stated turns, before any analysis of the log."""
+    """The turns as stated with the log: dwell, start and tolerances."""
 
     # dwell, start, turning, margin: as of `turning.find_turning`, s
     dwell: float
@@ -65,7 +65,7 @@ class TurnSchedule:
 def find_turns(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
-    """Return turns (at least one), knocks and doubts for a log without a column, in order.
+    """Return turns (at least one), knocks and doubts of a log without a position column, in order.
 
     The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
     are start and stop, s. Raises ValueError if there is no evidence of turns, nor trust.
@@ -198,7 +198,7 @@ def _follow_schedule(
     slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
-        raise ValueError("the schedule has no turn within the log")
+        raise ValueError(f"the schedule has no turn within the log of {schedule.duration:g} s")
     calm = leave_out_knocks(blocks, list_disturbances([e for e in events if e.kind == "transient"]))
     longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
     shift, z, unshifted = find_best_shift(
@@ -216,8 +216,8 @@ def _follow_schedule(
         if not (size >= _MIN_ALTERNATION_SIGMAS or trust):
             raise ValueError(
                 f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
-                f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "
-                "the schedule's word)"
+                f"and its level alternates by {size:.1f} standard errors; if the log was turned by "
+                "the clock, set trust_schedule"
             )
         doubts.append(
             f"no turns are visible: the schedule is used, and the level alternates with it by "
@@ -243,7 +243,7 @@ def _follow_schedule(
 
 
 def list_disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
-    """Return start and stop, s, of transients to leave out: neither turns nor noise."""
+    """Return start and stop, s, of the transients to leave out, which are clear or short."""
     return [
         (event.start - _KNOCK_MARGIN, event.stop + _KNOCK_MARGIN)
         for event in events
@@ -252,7 +252,7 @@ def list_disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
 
 
 def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
-    """Return the blocks with the blocks of knocks, from start to stop, s, marked as missing."""
+    """Mark the blocks from start to stop, s, of each knock as missing; return all blocks."""
     present = blocks.present.copy()
     for start, stop in knocks:
         first, last = int(start / blocks.length), math.ceil(stop / blocks.length)
@@ -273,8 +273,7 @@ def choose_turns(
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
     mixture about the multiples of the dwell (Student's t of 3 degrees of freedom). The sequence of
     the greatest likelihood is searched again with strength, usual dwell and scatter of the turns
-    found. Nominal dwell, tolerance (standard deviation of an interval) and duration of the log are
-    in s.
+    found. Dwell, tolerance (standard deviation of an interval) and duration of the log are in s.
     """
     if not events:
         return []
@@ -307,11 +306,11 @@ def choose_turns(
 def find_shorter_dwell(
     events: Sequence[Event], chosen: Sequence[int], dwell: float
 ) -> float | None:
-    """Return the dwell of the clear transients, s, if it is far shorter than nominal, s.
+    """Return the dwell of the clear transients, s, if far shorter than the nominal; else None.
 
-    If turns come at twice the declared pace, each second turn is taken for a knock, but is
-    periodic. The events are in order of time, with the indices of the turns chosen by the nominal
-    dwell.
+    If turns are twice as frequent as declared, `choose_turns` takes every second one for a knock,
+    but these knocks are periodic. The events are in order of time; ``chosen`` are the indices of
+    the turns by the nominal dwell.
     """
     turns = [events[k] for k in chosen]
     if len(turns) < 2:
@@ -394,7 +393,7 @@ def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
 
 
 def is_detection_uncertain(turns: Sequence[Event]) -> bool:
-    """Return whether a turn like these may be too weak to detect, by their strengths."""
+    """Return whether other turns, as strong as the given ones, may be too weak to detect."""
     usual, scatter = estimate_strength(turns)
     weak = np.mean(
         [event.kind == "transient" and event.strength < _WEAK_STRENGTH for event in turns]

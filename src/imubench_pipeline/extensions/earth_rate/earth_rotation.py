@@ -66,8 +66,8 @@ def make_earth_rate_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a turned gyro; none for a rejected recording.
 
-    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
-    of `imubench_pipeline.run.plan.Plan.experiment_settings`.
+    `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
+    `settings`: from `imubench_pipeline.run.plan.Plan.experiment_settings`.
     """
     rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
@@ -242,7 +242,6 @@ def _turning_rows(
     used: Array,
     begins: float,
 ) -> Iterator[TurningRow]:
-    """Yield the rows of the table ``turning``."""
     names = asdict(key)
     for text in turning.doubts:
         yield TurningRow(**names, what="doubt", doubts=(text,))

@@ -49,7 +49,7 @@ def _build_filter(model: NoiseModel, rate: float) -> _Filter:
     processes = [term.gauss_markov for term in model.terms if term.gauss_markov is not None]
     process = processes[0] if processes else None
     if model.N == 0 or (model.B > 0 and model.T_B is None):
-        raise ValueError("the paper's filter needs N, and a Gauss-Markov process for B")
+        raise ValueError("the filter of Silva et al. needs N, and a Gauss-Markov process for B")
     interval = 1.0 / rate
     return _Filter(
         math.exp(-interval / process.T_B) if process else 0.0,
@@ -71,8 +71,8 @@ def track(
 
     F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), x_0 = 0 as printed,
     although the first entry of Q_d is an approximation; P_0 = ``start`` I, (rad/s)^2. Samples of
-    turning are left out. The log, shape (samples,), is in rad/s, NaN where a sample is missing; so
-    is the known rate. Raises ValueError without N of the model, or T_B of its B.
+    turning are left out. The log, shape (samples,), and the known rate are in rad/s; a missing
+    sample is NaN. Raises ValueError if the model has no N, or a B without T_B.
     """
     one = _build_filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
@@ -108,7 +108,7 @@ def _run_filter(
 
 
 def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
-    """Return the data, s, until a mean, shape (n,), stays near the known rate; inf: not yet."""
+    """Return after what time, s, a mean, shape (n,), stays near the known rate; inf: not yet."""
     out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
     if len(out) == 0:
         return 0.0
@@ -120,7 +120,7 @@ def mean_sigma(
 ) -> Array:
     """Return the exact sigma of the mean of `track` after each sample, rad/s, shape (n,).
 
-    It is over the noise of the model and a fixed bias of the sigma ``turn_on_bias``, rad/s. The
+    It includes the noise of the model, and a fixed bias with the sigma ``turn_on_bias``, rad/s. The
     start is in (rad/s)^2, the rate in Hz. Raises ValueError as `track`.
     """
     one = _build_filter(model, rate)

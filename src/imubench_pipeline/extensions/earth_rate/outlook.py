@@ -57,7 +57,7 @@ _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goa
 
 @dataclass(frozen=True)
 class DwellCurve:
-    """The least standard deviation of the rate for a given run time, over the dwell."""
+    """The least standard deviation of the rate as a function of the dwell, for a run time."""
 
     dwells: NDArray[np.int64]  # shape (k,); number of dwells, increasing
     dwell: Array  # shape (k,); data in each, s
@@ -78,7 +78,7 @@ class DwellCurve:
 
 @dataclass(frozen=True)
 class Outlook:
-    """A gyro, a place and a turn; information grows linearly beyond 64 dwells."""
+    """Predicts how well a turned gyro finds the Earth's rate; extrapolates beyond 64 dwells."""
 
     model: NoiseModel
     latitude: float  # rad
@@ -87,15 +87,15 @@ class Outlook:
     turn_on_bias: float = math.inf  # of the fixed bias, rad/s; by default unknown
 
     def run_time(self, dwell: float, turns: int) -> float:
-        """Return the time of a number of turns and the dwells, s, before and after them, s."""
+        """Return the length, s, of a run with a number of turns and dwells of ``dwell``, s."""
         return (turns + 1) * dwell + turns * self.turning
 
     def sigmas_after(self, dwell: float, turns: int) -> Array:
-        """Return the bound, rad/s, after each of the turns and the dwell, s, that follows it."""
+        """Return the bound, rad/s, after each turn and its following dwell, s, shape (turns,)."""
         return convert_to_sigma(self._compute_information(dwell, turns + 1)[1:])
 
     def turns_needed(self, dwell: float, relative: float) -> int | None:
-        """Return the number of turns for a relative standard deviation of the Earth's rate.
+        """Return the turns that are needed for a relative standard deviation of the Earth's rate.
 
         None: more than `MAX_TURNS`. Each dwell has ``dwell`` s of data. Raises ValueError if
         ``relative``, such as 0.01, is not above 0.
@@ -122,13 +122,13 @@ class Outlook:
         return float(convert_to_sigma(np.array([last]))[0])
 
     def over_dwell(self, run_time: float) -> DwellCurve:
-        """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
+        """Return the bound of a run of ``run_time``, s, as a function of the length of its dwells.
 
-        The run consists of dwells and turns. The shortest dwell is a fourth of the turning time, or
-        one second. Raises ValueError if there is no time for two dwells and a turn.
+        The longest dwells have a single turn between them. The shortest are a fourth of the turning
+        time, or one second. Raises ValueError if there is no time for two dwells and a turn.
         """
         if run_time - self.turning < 2.0 / self.rate:
-            raise ValueError(f"{run_time} s do not hold two dwells and a turn")
+            raise ValueError(f"a run of {run_time:g} s is too short for two dwells and a turn")
         shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
         most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
         number = np.unique(np.rint(np.geomspace(2, most, _DWELL_CURVE_POINTS)).astype(np.int64))
@@ -182,8 +182,8 @@ def prediction_rows(
 ) -> Iterator[EarthRatePredictionRow]:
     """Yield the rows of the table ``earth_rate_prediction``.
 
-    ``dwell`` is the data in each, s; the goals are relative standard deviations. Raises ValueError
-    if the run time, s, for the best dwell, does not hold two dwells and a turn.
+    ``dwell``: data in each dwell, s; ``goals``: relative standard deviations; ``run_time``: length
+    of the run for the best dwell, s. Raises ValueError if this is too short for two dwells.
     """
     row = partial(EarthRatePredictionRow, **asdict(key), latitude=outlook.latitude)
     most = 1
@@ -235,8 +235,8 @@ def make_outlook_tables(
 ) -> dict[str, Sequence[TableRow]]:
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
-    `folders`: of its static recordings; `settings`: of `plan.select_outlook_settings`. There are no
-    rows without gyro noise, and no rows of ``alignment`` without an accelerometer.
+    `folders`: results of its static recordings; `settings`: from `plan.select_outlook_settings`.
+    There are no rows without gyro noise, and no rows of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)

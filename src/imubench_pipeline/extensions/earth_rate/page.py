@@ -55,7 +55,7 @@ ESTIMATES = ("filter", "pairs", "triples")
 
 @dataclass(frozen=True)
 class EarthRateLine:
-    """A line of the table of estimates."""
+    """A line of the table of Earth-rate estimates on a page, with its texts."""
 
     row: EarthRateRow
     term: str
@@ -68,7 +68,7 @@ class EarthRateLine:
 
 @dataclass(frozen=True)
 class Goal:
-    """The requirement for a standard deviation of the Earth's rate."""
+    """The turns and the time that a standard deviation of the Earth's rate requires, as texts."""
 
     goal: str
     turns: str
@@ -102,7 +102,7 @@ class Alignment:
 
 
 def make_turned_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
-    """Return the context of the template; ``folder`` is the recording's."""
+    """Return the context of the page of a turned gyro; ``folder``: results of the recording."""
     arrays = Arrays()
     rows = view.rows(EarthRateRow)
     channel = rows[0].channel if rows else ""
@@ -480,7 +480,7 @@ _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
 
 def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
-    """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
+    """Return the predicted alignment of each sensor for a page; ``arrays`` gets the curves."""
     entries = []
     unit = choose_page_unit("gyro", "adev", site.system)
     fine = choose_page_unit("accel", "adev", "si")

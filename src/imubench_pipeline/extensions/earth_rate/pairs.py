@@ -19,7 +19,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Differences:
-    """The mean of estimates from differences between dwells, as it grows with time."""
+    """The running mean of estimates from differences between dwells, with its standard error."""
 
     time: Array  # shape (p,); end of the last dwell of each, s from the first sample
     rate: Array  # shape (runs, p); mean of the estimates up to each, rad/s

@@ -5,7 +5,7 @@ from imubench_pipeline.run.plan import Plan, to_json
 
 
 def select_outlook_settings(plan: Plan, sensor: str) -> str:
-    """Return the settings of the predictions for a sensor at rest."""
+    """Return, as JSON, the settings of the predictions for a sensor at rest."""
     declared = plan.sensors.get(sensor)
     biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
     printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}

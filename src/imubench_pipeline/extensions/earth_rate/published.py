@@ -61,7 +61,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Courses:
-    """The estimates of one experiment, and their data."""
+    """The estimates of one experiment by every method, with the block means that they use."""
 
     courses: tuple[Course, ...]  # one per method
     measured: Measured
@@ -70,7 +70,7 @@ class Courses:
 
 
 def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return the lower limit of sigma, N / sqrt(T) / cos(latitude), rad/s, of T s in blocks."""
+    """Return the least sigma by white noise, N / sqrt(T) / cos(latitude), rad/s, T s in blocks."""
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
 
@@ -141,8 +141,8 @@ def compute_sigma_ranges(
 ) -> dict[str, Range]:
     """Return the 95 % limits of the standard deviation of each method at the end of a run, rad/s.
 
-    They are over models drawn from the limits of the parameters; methods without an estimate are
-    left out. The standard deviation of the fixed bias is in rad/s; None: unknown.
+    They are quantiles over the models ``drawn`` within the limits of the parameters. Methods
+    without an estimate are left out. ``turn_on_bias``: sigma of the fixed bias, rad/s, or unknown.
     """
     if not drawn:
         return {}
@@ -168,7 +168,7 @@ def compute_sigma_ranges(
 
 @dataclass(frozen=True)
 class AllowedSigmas:
-    """Standard deviations by noise of the estimates of a run, rad/s."""
+    """Standard deviations that the noise gives the estimates of a run, rad/s."""
 
     white: float  # by white noise alone
     sigma: float  # of the mean over pairs
@@ -176,7 +176,7 @@ class AllowedSigmas:
 
 
 def compute_allowed_sigmas(design: Experiment, model: NoiseModel) -> AllowedSigmas:
-    """Return the standard deviations by noise of estimates of a run."""
+    """Return the standard deviations that the noise of a model gives the estimates of a run."""
     blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
     return AllowedSigmas(
@@ -193,7 +193,7 @@ def judge_error(off: float) -> str:
 
 @dataclass(frozen=True)
 class PrintedRun:
-    """A run as its source prints it, or a part of it."""
+    """A published run of turns, or a part of such a run."""
 
     duration: float  # s
     value: float  # printed estimate, rad/s
@@ -209,23 +209,23 @@ class PrintedRun:
 
 
 def compute_needed_drift(off: float, period: float, latitude: float) -> float:
-    """Return the drift, rad/s^2, that causes an error of pairs, rad/s, at a period of turns, s."""
+    """Return the bias drift, rad/s^2, that explains an error, rad/s; ``period``: of turns, s."""
     return -2.0 * math.cos(latitude) * off / period
 
 
 def compute_needed_angle(off: float, dwell: float, latitude: float) -> float:
-    """Return the angle of turning, rad, that must remain in each dwell of this length, s."""
+    """Return the turning, rad, left in each dwell, s, that would explain an error, rad/s."""
     return off * dwell * math.cos(latitude)
 
 
 def compute_wrong_share(value: float, true: float) -> float | None:
-    """Return the part of a run with the wrong sense; None if no part explains the value."""
+    """Return the fraction of a run whose wrong sense would explain a value; None if none does."""
     part = 0.5 * (1.0 - value / true)
     return part if 0.0 <= part <= 1.0 else None
 
 
 def compute_needed_heading(value: float, true: float) -> float | None:
-    """Return the angle between axis and meridian, rad; None if no angle explains the value."""
+    """Return the angle of axis to meridian, rad, that explains a value; None if no angle does."""
     return math.acos(value / true) if abs(value) <= abs(true) else None
 
 
@@ -243,7 +243,7 @@ class WarmUp:
 
 
 def fit_warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
-    """Return the warm-up with mean drifts ``first`` and ``last``, rad/s^2; None without one."""
+    """Fit a warm-up to the mean drifts, rad/s^2, before and in a run's last part; None if none."""
     if not 0.0 < last / first < 1.0:
         return None
     rest = duration - last_duration
@@ -262,7 +262,7 @@ def fit_warm_up(first: float, last: float, duration: float, last_duration: float
 
 
 def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
-    """Return the misfit, in sigma, of the best single turn after which the senses are wrong."""
+    """Return the least misfit, in sigma, if the senses are wrong from a single turn on."""
     first = whole.without(last)
     flips = np.linspace(0.0, whole.duration, 6001)
     before = np.clip(flips / first.duration, 0.0, 1.0)

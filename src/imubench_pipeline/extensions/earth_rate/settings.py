@@ -96,7 +96,7 @@ class PublishedRate(Strict):
 
     where: Text = Field(description="such as section 6")
     printed: Rate = Field(description="printed value, with its unit")
-    part: Text = Field("whole", description="part part of the run: whole, or such as 'last 13 min'")
+    part: Text = Field("whole", description="part of the run: whole, or such as 'last 13 min'")
 
 
 class SimulatedTurns(TwoPosition):
@@ -147,5 +147,5 @@ class EarthRateSettings(Strict):
     @classmethod
     def _check_goals(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
         if min(goals) <= 0:
-            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
+            raise ValueError("expected fractions above 0, such as 0.01 for 1 %")
         return goals

@@ -62,7 +62,7 @@ def design_paper_run(minutes: float) -> Experiment:
 
 @dataclass(frozen=True)
 class Runs:
-    """Simulated runs of one design, and their truth."""
+    """Simulated block means of runs, with the true errors."""
 
     means: Array  # shape (runs, b); block means, rad/s
     drift: Array  # shape (runs, b); mean slow error over each block, bias included, rad/s
@@ -78,7 +78,7 @@ def simulate_runs(
     runs: int,
     rng: np.random.Generator,
 ) -> Runs:
-    """Draw exact block means of runs; the rate, and sigma of the fixed biases, are in rad/s."""
+    """Draw block means of runs; ``earth_rate``, and sigma ``turn_on_bias`` of biases, in rad/s."""
     block_model = discretise_blocks(model, blocks, turn_on_bias)
     m = len(block_model.initial)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
@@ -112,7 +112,7 @@ def simulate_log(
 
 
 def compute_true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
-    """Return error-free readings, rad/s, shape (samples,), with pulse peaks, one a turn or one."""
+    """Return error-free readings, rad/s, shape (samples,); ``transient``: pulse peaks of turns."""
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
     seen = earth_rate * math.cos(experiment.latitude)
@@ -135,7 +135,7 @@ def compute_true_rate(experiment: Experiment, earth_rate: float, transient: Arra
 
 
 def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:
-    """Return the readings of a gyro that is turned by a schedule; the transients differ."""
+    """Return the ideal readings of a gyro that is turned by a schedule, with random transients."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
     dwell, turning = turns.seconds("dwell"), turns.seconds("turning")

@@ -12,7 +12,7 @@ from imubench_pipeline.model.table import (
 )
 
 TurnedGyro = Annotated[str, "the gyro that was turned"]
-Part = Annotated[str, "part: part: whole, or the last minutes of the recording"]
+Part = Annotated[str, "part: whole, or the last minutes of the recording"]
 Method = Annotated[
     str,
     "pairs, triples, filter, smoother; known_rate (input: the true rate) starts with 0.1 "
@@ -66,7 +66,7 @@ class EarthRateSeriesRow(OfRecordingRow):
 @table("turning")
 class TurningRow(OfRecordingRow):
     channel: TurnedGyro
-    what: Annotated[str, "dwell, turn, knock, or a doubt about the whole log log"]
+    what: Annotated[str, "dwell, turn, knock, or a doubt about the whole log"]
     number: Annotated[int | None, "in order, from 1"] = None
     start: Annotated[float | None, "from the first sample of the recording", "s"] = None
     stop: Annotated[float | None, "its end; of a turn: end of the time left out", "s"] = None
@@ -127,7 +127,7 @@ class AlignmentRow(OfRecordingRow):
     error_pitch: Annotated[float | None, "the same, over pitch"] = None
     error_heading: Annotated[float | None, "the same, over heading"] = None
     simulated: Annotated[int | None, "number of triads of this check; null: none"] = None
-    latitude: Annotated[float, "latitude, latitude, as set (earth_rate: latitude)", "rad"]
+    latitude: Annotated[float, "latitude, as set (earth_rate: latitude)", "rad"]
     gyro_bias: Annotated[float, "standard deviation of the fixed biases", "rad/s"]
     gyro_bias_from: Annotated[str, "source of this figure"]
     accelerometer_bias: Annotated[float, "standard deviation of the fixed biases", "m/s^2"]

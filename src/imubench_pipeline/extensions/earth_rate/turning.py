@@ -40,7 +40,7 @@ _POSITION_TOLERANCE = 0.1  # about a position, as a share of the distance betwee
 
 @dataclass(frozen=True)
 class Stays:
-    """Stays of the sensor in its positions."""
+    """Intervals in which a sensor stays in one of its two positions."""
 
     # start, stop: shape (n,); s; between two of them, the gyro turns
     start: Array
@@ -51,12 +51,12 @@ class Stays:
 
 
 def find_stays(position: Array, rate: float, shortest: float) -> Stays:
-    """Find the stays in two positions: the medians of the column's lower and upper half, by range.
+    """Find the intervals in which a sensor stays in one of two positions, from a column.
 
-    A sample within a tenth of their distance of one is in it. The column, shape (n,), is in any
-    unit, NaN where it is not known; an angle must not wrap at a position. The rate is in Hz; stays
-    below the shortest, s, are overshoots. Raises ValueError if the column has one position only, or
-    none.
+    The positions are the medians of the values below and above mid-range; samples within a tenth of
+    their distance belong to a position. The column, shape (n,), is in any unit, NaN where it is not
+    known; an angle must not wrap at a position. The rate is in Hz; stays below ``shortest``, s, are
+    overshoots. Raises ValueError if the column has fewer than two positions.
     """
     finite = np.flatnonzero(np.isfinite(position))
     if len(finite) == 0:

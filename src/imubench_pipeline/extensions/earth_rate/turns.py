@@ -46,7 +46,7 @@ class LevelBlocks:
 
 @dataclass(frozen=True)
 class Event:
-    """A transient or a step: perhaps a turn, perhaps not."""
+    """A transient or a step of the level, which may be a turn."""
 
     # start, stop: s from the first sample; equal for a step
     start: float
@@ -64,7 +64,7 @@ class Event:
 
     @property
     def is_clear(self) -> bool:
-        """Whether it is neither noise nor a knock."""
+        """Whether the event is neither noise nor a knock."""
         return self.likelihood > CLEAR_LOG_LIKELIHOOD and not self.haste
 
 
@@ -73,10 +73,10 @@ def average_log_blocks(
 ) -> LevelBlocks:
     """Average a log over blocks, with their level and noise.
 
-    The level is a running median over less than a dwell, the noise the median absolute deviation
-    from it, or the noise at rest if within a factor of 1.5. The log, shape (n,), is in rad/s, NaN
-    where a sample is missing; the rate in Hz, the dwell in s. Raises ValueError if hardly any
-    samples differ.
+    The level is a running median over less than a dwell. The noise is from the median absolute
+    deviation from it, or from the model if both agree within a factor of 1.5. The log, shape (n,),
+    is in rad/s, NaN where a sample is missing; the rate in Hz, the dwell in s. Raises ValueError
+    if there are too few samples, or hardly any differ.
     """
     size = max(1, round(BLOCK_LENGTH * rate))
     length = size / rate
@@ -97,7 +97,7 @@ def average_log_blocks(
     residual = np.where(present, (mean - level) * weight, 0.0)
     own = _estimate_sigma(residual[present])
     if own == 0.0:
-        raise ValueError("all samples of the log are the same, or nearly all: no noise, no turns")
+        raise ValueError("all or nearly all samples of the log are equal, so no turn is visible")
     sigma, rough = own, False
     if model is not None:
         of_model = math.sqrt(float(model.allan_variance(length, rate)))
@@ -236,9 +236,9 @@ def detect_steps(
 ) -> list[Event]:
     """Return significant steps of the level, in order of time.
 
-    A step is a difference of the means over a third of a dwell, s, of 8 standard deviations. It
-    takes a gyro far better than the SiRRS01-03 of Silva et al. The drift of a noise model is no
-    step; without a model, the noise is white. The rate, Hz, is for quantization noise.
+    The means over a third of a dwell, s, before and after a step differ by 8 standard deviations.
+    Only a gyro far better than the SiRRS01-03 of Silva et al. shows steps. The standard deviation
+    includes the drift of a model, by default white noise. The rate, Hz, is for quantization noise.
     """
     width = round(dwell / 3.0 / blocks.length)
     if width < 4 or 2 * width >= len(blocks.z):
@@ -356,10 +356,10 @@ def _find_samples(start: float, stop: float, rate: float) -> tuple[int, int]:
 def compute_differences(
     blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
 ) -> tuple[Array, Array]:
-    """Return the A-B-A differences of n dwells, with equal signs, and the variances of their means.
+    """Return the A-B-A differences of n dwells, and the variances of the means of the dwells.
 
-    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, rad/s, shape (n - 2,); for two dwells, half
-    their difference. The variances are from the noise of the blocks, (rad/s)^2, shape (n,).
+    With m_i the means, they are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, rad/s, shape (n - 2,); for
+    two dwells, half their difference. The variances, (rad/s)^2, shape (n,), follow from the noise.
     """
     total = np.concatenate(([0.0], np.cumsum(clip_block_means(blocks))))
     present = np.concatenate(([0], np.cumsum(blocks.present)))
@@ -397,7 +397,7 @@ def _average(difference: Array, white: Array) -> Alternation:
 
 
 def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
-    """Return the dwell from which the alternation has the opposite sign, which raises a doubt."""
+    """Return the index of the dwell from which the alternation has the opposite sign, or None."""
     difference, white = compute_differences(blocks, stretches)
     if len(difference) < 6:
         return None
@@ -414,7 +414,7 @@ def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, flo
 def find_best_shift(
     blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
-    """Return the delay of the turns, s, of the largest alternation, and z with and without it.
+    """Return the delay of turns, s, with the largest alternation, and z with and without delay.
 
     All shifts, up to ``longest``, s, share one standard error, so that z^2 is twice the
     log-likelihood. The turns are the scheduled ones (see `split_at_turns`).

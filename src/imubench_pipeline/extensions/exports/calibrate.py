@@ -28,7 +28,7 @@ _MAX_WIDTH = 80
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.description = (
         "Read static logs of one device, judge them, estimate the noise, and write the input file "
         "of a filter or simulator. Several logs are pooled."
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file and print what it holds; return the exit status."""
+    """Write the file, print its values and the state of the logs; return the exit status."""
     from imubench_pipeline.run.analysis.compilation import Compilation
 
     with Compilation(analysis.say) as compiling:
@@ -69,7 +69,7 @@ def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
     for topics, path in _list_files(options, output.path):
         if path.absolute() in notes:
             raise command_line.CommandError(
-                f"{path}: is where the notes of a log are; name another file with --output"
+                f"{path} is the path of the notes of a log; choose another file with --output"
             )
         own = output.beside(path)
         own.check()  # before the log is read
@@ -92,7 +92,7 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
     except RecordingError as error:
         raise command_line.CommandError(str(error)) from None
     if not found:
-        raise command_line.CommandError(f"{options.logs[0]}: no gyro; expected one for each IMU")
+        raise command_line.CommandError(f"{options.logs[0]}: found no gyro; --all needs an IMU")
     used: list[Path] = []
     for topics in found:
         name = re.sub(r"\W+", "_", topics[0]).strip("_")

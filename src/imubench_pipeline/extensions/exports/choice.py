@@ -27,7 +27,7 @@ _MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; furth
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen axis."""
+    """The axis that represents a sensor, with its noise."""
 
     recording: str
     channel: str
@@ -35,7 +35,7 @@ class Choice:
     axis: AxisNoise
     determined: bool = True  # whether a slow term has a value; else it is only limited from above
     each: Mapping[str, "Choice"] = field(default_factory=dict)
-    """The axes x, y and z with an estimate, each chosen among its own."""
+    """For each of x, y and z with an estimate: the choice among the estimates of this axis."""
 
 
 def choose(
@@ -82,7 +82,7 @@ def choose(
             ranked.append((deviation, key, estimate))
     ranked.sort(key=lambda entry: entry[0])
     if not ranked:
-        raise ExportError(f"no estimate of a {quantity} with white noise")
+        raise ExportError(f"no {quantity} estimate has white noise; use another log or method")
     whose = "" if axis in (WORST, MEDIAN) else axis
     names = [f"{quantity}_{letter}" for letter in AXES]
 
@@ -134,9 +134,9 @@ def choose(
 def pool_recordings(
     rows: Iterable[ParameterRow], choice: Choice, method: str | None = None
 ) -> Choice:
-    """Return the chosen channel with the mean of its spectra over all recordings of a device.
+    """Replace the model of a chosen channel by the mean of its spectra in all recordings.
 
-    ``method`` as for `choose`. The mean of the spectra has the mean of N^2, K^2 and B^2.
+    All ``rows`` are of one device; ``method`` as for `choose`. N^2, K^2 and B^2 are averaged.
     """
     parts: dict[str, list[ParameterRow]] = defaultdict(list)
     for row in rows:
@@ -167,7 +167,7 @@ def pool_recordings(
 
 
 def parameter_notes(estimate: Estimate, determined: bool = True) -> list[str]:
-    """Describe the treatment of the parameters without a plain value.
+    """Return notes on parameters that are not plainly estimated: which value or limit is used.
 
     ``determined``: whether a slow term has a value; else the slow terms are not used.
     """

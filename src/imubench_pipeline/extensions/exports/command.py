@@ -24,7 +24,7 @@ NOT_MEASURED = Path()  # --in-use without a log
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.add_argument(
         "results",
         type=Path,
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of a file, which `imubench calibrate` has, too."""
+    """Add the options of an exported file, for `imubench export` and `imubench calibrate`."""
     parser.add_argument(
         "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
     )
@@ -113,7 +113,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file; return the exit status."""
+    """Write the input file of a program; return the exit status."""
     from imubench_pipeline.extensions.exports.imu import ExportError
 
     try:
@@ -126,28 +126,28 @@ def run(options: argparse.Namespace) -> int:
         options.output.write(content)
         print(f"{options.output.path}: {imu.mode}")
     elif isinstance(content, bytes):
-        raise command_line.CommandError(f"{options.target} is no text; expected --output FILE")
+        raise command_line.CommandError(f"files of {options.target} are binary; add --output FILE")
     else:
         print(content, end="")
     return 0
 
 
 def check_options(options: argparse.Namespace) -> "Program":
-    """Return the program of a file, and complete the options of its mode.
+    """Return the program that ``--target`` names; set the mode if ``--in-use`` is given.
 
-    Raises CommandError or ExportError if options do not belong together.
+    Raises CommandError for an inflation without a reason, ExportError for an unknown program.
     """
     from imubench_pipeline.extensions.exports.of_models import find_target
 
     if options.inflation != 1.0 and not options.because:
-        raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
+        raise command_line.CommandError("--inflate needs a reason; add --because '...'")
     if options.in_use is not None:
         options.mode = "in-use"
     return find_target(options.target)
 
 
 def make_request(options: argparse.Namespace, **values: Any) -> Any:
-    """Return the request of a file from the options of a command, completed by values."""
+    """Return the `Request` from the options of a command; ``values`` replace options."""
     from imubench_pipeline.extensions.exports.request import Request
 
     own = vars(options) | values
@@ -159,14 +159,15 @@ def _build_from_results(options: argparse.Namespace) -> "Imu":
     from imubench_pipeline.extensions.exports.request import build_imu, load, recordings_of
 
     if options.results is None:
-        raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
+        raise command_line.CommandError("found no folder of results; add it, or --datasheet NAME")
     tables, folder = load(options.results), recordings_of(options.results)
     sensor = options.sensor
     if sensor is None:
         names = sorted(set(tables["recordings"]["sensor"].to_pylist()))
         if len(names) != 1:
             raise ExportError(
-                f"which sensor of the results? expected --sensor NAME: {', '.join(names)}"
+                f"the results have {len(names)} sensors; add --sensor NAME; there are: "
+                f"{', '.join(names)}"
             )
         (sensor,) = names
     known = _read_catalogue().get(sensor) if options.in_use else None
@@ -186,9 +187,9 @@ def _build_from_datasheet(options: argparse.Namespace) -> "Imu":
     from imubench_pipeline.extensions.exports.targets import TARGETS
 
     if options.results is not None:
-        raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
+        raise command_line.CommandError("found results and --datasheet; omit one of the two")
     if options.mode == "bounded":
-        raise ExportError("a bound needs a log: expected --datasheet without --bounded")
+        raise ExportError("--bounded needs a log; omit it, or give results instead of --datasheet")
     found = sensors.find_sensors(_read_catalogue(), options.datasheet)
     name = options.datasheet.lower()
     if name not in found:
@@ -208,8 +209,8 @@ def read_in_use(
 ) -> "Mapping[str, InUseNoise] | None":
     """Return the noise of each channel of a log in use; None without a log.
 
-    ``sensor`` has its format; None: drafted, and ``stated`` completes the draft. Raises ExportError
-    if the log cannot be read, or is too short.
+    ``sensor``: its sensor file; None: a draft, completed by ``stated``. Below ``cutoff``, Hz, noise
+    is taken as motion. Raises ExportError if the log cannot be read, or is too short.
     """
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.in_use import measure_in_use
@@ -223,15 +224,15 @@ def read_in_use(
     if path in (None, NOT_MEASURED):
         return None
     if not path.exists():
-        raise ExportError(f"{path}: no such file; expected a log in use")
+        raise ExportError(f"{path}: no such file; expected a log in use, with motors on")
     if sensor is None:
         try:
             drafted = draft_sensor(path, Stated())
         except UnfilledError:
             if not stated:
                 raise ExportError(
-                    f"{path}: its header does not state units or rate; expected columns such as "
-                    "gyro_x [deg/s], or a log of the sensor file of the run"
+                    f"{path}: the header does not state units or rate; name columns such as "
+                    "'gyro_x [deg/s]', or use a log in the format of the sensor file"
                 ) from None
             drafted = draft_sensor(path, stated)
         sensor = parse(Sensor, drafted, f"drafted from {path}")

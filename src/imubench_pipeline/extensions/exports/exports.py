@@ -23,10 +23,10 @@ NOT_MADE = "not_made.txt"  # names the programs for which there is no file, with
 def make_exports(
     tables: Tables, settings: ExportSettings, recordings: Path | None = None
 ) -> Iterator[tuple[Path, str | bytes]]:
-    """Yield the files of a run, each with its place in the folder of the exports.
+    """Yield path and content of each exported file of a run; paths are below the exports folder.
 
-    A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` has the
-    reasons of missing files. `tables` and `recordings`: as of `request.make_content`.
+    A path is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` has the
+    reasons of missing files. `tables` and `recordings`: as in `request.make_content`.
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []

@@ -85,8 +85,8 @@ def write_matlab_factor(imu: Imu) -> str:
     """
     if imu.rate < _MIN_MATLAB_RATE:
         raise ExportError(
-            f"the rate is {imu.rate:g} Hz, and SampleRate of factorIMUParameters is "
-            f"{_MIN_MATLAB_RATE:g} Hz or more; if the samples are interpolated, state their rate "
+            f"the rate is {imu.rate:g} Hz, but factorIMUParameters needs a SampleRate of "
+            f"{_MIN_MATLAB_RATE:g} Hz or more; if you interpolate the samples, state the new rate "
             "(--rate)"
         )
     return programs.fill_layout(imu, MATLAB_FACTOR)

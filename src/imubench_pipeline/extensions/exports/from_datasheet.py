@@ -22,13 +22,13 @@ def build_printed_imu(
     because: str | None = None,
     rate: float | None = None,
 ) -> Imu:
-    """Return the noise that a datasheet prints, with limits of the class for what it does not.
+    """Return the noise by a datasheet; figures that it does not print are the worst of the class.
 
     ``horizon`` is in s, ``rate`` in Hz, by default the highest of the sensor. Raises ExportError
     without a rate.
     """
     if rate is None and sensor.rate is None:
-        raise ExportError(f"the file of {name} states no rate; state it (--rate)")
+        raise ExportError(f"the sensor file of {name} states no rate; add the rate (--rate)")
     sheet = sensor.datasheet
     document = ", ".join(filter(None, (sheet.document, sheet.revision))) or "its sensor file"
     axes = {

@@ -139,7 +139,7 @@ class AxisNoise:
     """The axes x, y and z that have an estimate, for programs that take three numbers."""
 
     def inflated(self, factor: float) -> "AxisNoise":
-        """Return the noise with all densities and amplitudes times a factor."""
+        """Return the noise with all densities and amplitudes multiplied by a factor."""
         return replace(
             self,
             model=self.model.scaled(factor),
@@ -148,10 +148,10 @@ class AxisNoise:
 
 
 def split_axes(axes: Mapping[str, AxisNoise]) -> dict[str, AxisNoise]:
-    """Return the noise of each axis by names such as ``gyro x``, from quantities.
+    """Split the noise of each quantity into axes with names such as ``gyro x``.
 
-    The noise of a quantity stays under its own name if an axis has no estimate. An overbound exists
-    for the chosen axis only.
+    A quantity keeps its name for axes without an estimate, and where it is not split: if all axes
+    are equal, or its model is an overbound.
     """
     split: dict[str, AxisNoise] = {}
     for name, axis in axes.items():
@@ -165,7 +165,7 @@ def split_axes(axes: Mapping[str, AxisNoise]) -> dict[str, AxisNoise]:
 
 @dataclass(frozen=True, kw_only=True)
 class Imu:
-    """The noise of a sensor; ExportError out of range, or for an inflation without reason."""
+    """Noise of a sensor, with settings of an export; ExportError if a setting is invalid."""
 
     sensor: str
     rate: float  # of the samples that the program will get, Hz
@@ -188,11 +188,10 @@ class Imu:
             if not (math.isfinite(value) and value > 0):
                 raise ExportError(f"{name} is {value}, expected a number above 0")
         if not self.horizon * self.rate > 2.0:
-            raise ExportError(f"the horizon of {self.horizon:g} s is shorter than two samples")
+            least = f"two samples; expected more than {2.0 / self.rate:g} s"
+            raise ExportError(f"the horizon of {self.horizon:g} s is not longer than {least}")
         if self.inflation != 1.0 and not (self.because or "").strip():
-            raise ExportError(
-                f"an inflation of {self.inflation:g} needs its reason: what is it for?"
-            )
+            raise ExportError(f"an inflation of {self.inflation:g} needs a reason: state 'because'")
 
     @property
     def axes(self) -> dict[str, AxisNoise]:
@@ -204,5 +203,6 @@ class Imu:
         missing = [name for name in ("gyro", "accel") if name not in self.axes]
         if missing:
             raise ExportError(
-                f"{self.sensor}: no estimate of {' and '.join(missing)}, which this program needs"
+                f"{self.sensor}: no estimate of {' and '.join(missing)}; this program needs gyro "
+                "and accel: use logs of both"
             )

@@ -42,8 +42,8 @@ class InUseNoise:
 def measure_in_use(samples: Array, rate: float, cutoff: float = MOTION_CUTOFF) -> InUseNoise:
     """Return the broadband noise and the lines of samples of shape (L,), SI, at a rate in Hz.
 
-    Missing samples are NaN; each part between them counts. Below the cut-off, Hz, all is motion.
-    Raises ExportError if less than 32 s are without gaps, or the rate is too low for the cut-off.
+    Missing samples are NaN; parts of 4 s or more between them are used. All noise below ``cutoff``,
+    Hz, is motion. ExportError if these parts have less than 32 s, or the rate is too low.
     """
     size = max(int(_SEGMENT * rate), 2 * _MIN_BAND)
     present = np.concatenate(([False], np.isfinite(samples), [False]))
@@ -52,8 +52,8 @@ def measure_in_use(samples: Array, rate: float, cutoff: float = MOTION_CUTOFF) -
     length = sum(len(part) for part in parts)
     if length < _MIN_SEGMENTS * size:
         raise ExportError(
-            f"the log in use has {length / rate:.3g} s in parts of at least {size / rate:.3g} s; "
-            f"expected {_MIN_SEGMENTS * size / rate:.3g} s or more"
+            f"the log in use has {length / rate:.3g} s in parts of {size / rate:.3g} s or more "
+            f"without gaps; expected {_MIN_SEGMENTS * size / rate:.3g} s: record a longer log"
         )
     spectra = [welch(detrend(part), rate, nperseg=size) for part in parts]
     frequency = spectra[0][0]
@@ -64,8 +64,9 @@ def measure_in_use(samples: Array, rate: float, cutoff: float = MOTION_CUTOFF) -
     band = (frequency >= cutoff) & (frequency < 0.5 * rate)
     if band.sum() < _MIN_BAND:
         raise ExportError(
-            f"a log in use at {rate:.4g} Hz has no noise above the motion, below {cutoff:.3g} Hz; "
-            f"expected a rate above {2.0 * (cutoff + _MIN_BAND * step):.3g} Hz, or a lower --motion"
+            f"at {rate:.4g} Hz, a log in use has too little bandwidth above the motion "
+            f"({cutoff:.3g} Hz); expected a rate above {2.0 * (cutoff + _MIN_BAND * step):.3g} Hz, "
+            "or a lower --motion"
         )
     fast, at = density[band], frequency[band]
     level = median_filter(fast, min(_MEDIAN_WIDTH, len(fast)), mode="nearest")

@@ -43,9 +43,9 @@ class Mapped:
 
 
 def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
-    """Return white noise and a random walk in place of a model.
+    """Replace a noise model by white noise and a random walk.
 
-    The horizon is in s. The error is evaluated at tau from the period of the rate, Hz.
+    The error is stated for tau from one sample, 1 / ``rate`` (Hz), to twice ``horizon`` (s).
     """
     slow = _select_slow_terms(model)
     if all(term.role is Role.RANDOM_WALK for term in slow):
@@ -58,7 +58,7 @@ def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
 def as_process(
     model: NoiseModel, horizon: float, rate: float, *, walk: bool = False, time: float | None = None
 ) -> Mapped:
-    """Return white noise and one Gauss-Markov process in place of a model.
+    """Replace a noise model by white noise and one Gauss-Markov process.
 
     T_B minimises the mean square error of the logarithm of the Allan variance, from a thirtieth of
     the horizon to the horizon; or it is `time`, s. For `horizon`, s, and `rate`, Hz, see `as_walk`.
@@ -80,9 +80,9 @@ def as_process(
 
 
 def find_common_time(models: Sequence[NoiseModel], horizon: float, *, walk: bool = False) -> float:
-    """Return the T_B, s, with which one process in place of each model is nearest to them all.
+    """Return the T_B, s, for which replacing each model by one process has the least error.
 
-    See `as_process`. It is the horizon if no model has a slow term.
+    The error is the one of `as_process`. T_B is the horizon, s, if no model has a slow term.
     """
     slow = [(model.N, terms) for model in models if (terms := _select_slow_terms(model, walk=walk))]
     own = {term.gauss_markov and term.gauss_markov.T_B for _, terms in slow for term in terms}
@@ -113,17 +113,17 @@ def _make_process(variance: float, horizon: float, T_B: float) -> GaussMarkov:
 def map_to_family(
     model: NoiseModel, family: str, horizon: float, rate: float, time: float | None = None
 ) -> Mapped:
-    """Return a model with the terms of a family, N+K, N+GM or N+GM+K; `time` as in `as_process`."""
+    """Replace a model by one of a family; N+GM+K: unchanged. `time` is as in `as_process`."""
     if family == "N+K":
         return as_walk(model, horizon, rate)
     return as_process(model, horizon, rate, time=time) if family == "N+GM" else Mapped(model, [])
 
 
 def bound_walk(curve: AllanCurve, N: float, horizon: float) -> float:
-    """Return an upper 95 % limit of K, SI, from a curve without slow terms.
+    """Return an upper 95 % limit of K, SI, from a curve that shows no slow term.
 
-    At the horizon, s, or at the end of a shorter curve: what the Allan variance has above white
-    noise N, if anything, and the half-width of its interval, are K^2 tau / 3.
+    At tau = horizon, s, or at the end of a shorter curve, K^2 tau / 3 is the excess of the Allan
+    variance over N^2 / tau, at least 0, plus the half-width of its interval.
     """
     place = int(np.searchsorted(curve.tau, min(horizon, float(curve.tau[-1])) * (1.0 - 1e-9)))
     tau, variance = float(curve.tau[place]), float(curve.variance[place])

@@ -45,10 +45,10 @@ def compute_matrices(
 ) -> tuple[Matrices, Matrices, list[str]]:
     """Return a model in continuous and in discrete time, and the term of each discrete state.
 
-    The rate is in Hz; flicker noise is approximated up to four times `horizon`, s. Of m continuous
-    states, without the states of quantization noise: F and Q, shape (m, m), H, shape (m,), and the
-    density R of the white noise. Of n discrete states: Phi, Q_d and P0, shape (n, n), H and x0,
-    shape (n,), and the variance R_d.
+    The rate is in Hz; flicker noise is approximated up to four times `horizon`, s. Continuous, with
+    m states, none for quantization noise: F and Q, shape (m, m), H, shape (m,), and the density R
+    of the white noise. Discrete, with n states: Phi, Q_d and P0, shape (n, n), H and x0, shape
+    (n,), and the variance R_d.
     """
     longest = max(FLICKER_TAU_OVER_HORIZON * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
@@ -104,7 +104,7 @@ def write_json(imu: Imu) -> str:
 
 
 def write_npz(imu: Imu) -> bytes:
-    """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``."""
+    """Return the matrices of `write_json` as a ``.npz`` file, with arrays such as ``gyro_Phi``."""
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
         continuous, discrete, _ = compute_matrices(axis.model, imu.rate, imu.horizon)

@@ -24,7 +24,7 @@ Densities = Mapping[str, tuple[float, float]]  # N and K of gyro and accel, SI
 
 @dataclass(frozen=True)
 class Floor:
-    """Least noise for a filter in use without a log in use, by the authors of its program."""
+    """Least noise in use, as recommended by a program's authors, if there is no log in use."""
 
     source: str
     factor: float = 1.0  # on all densities at rest
@@ -33,7 +33,7 @@ class Floor:
     step: float | None = None  # s; None: from one sample to the next
 
     def densities(self, rate: float) -> Densities:
-        """Return N and K for samples at a rate, Hz."""
+        """Return the least N and K, SI, of each quantity for samples at a rate, Hz."""
         root = math.sqrt(self.step or 1.0 / rate)
         steps = {"gyro": self.gyro, "accel": self.accel}
         return {name: (N * root, K * root) for name, (N, K) in steps.items()}
@@ -81,17 +81,17 @@ FLIGHT_TARGETS = frozenset({"px4", "px4-mavparm", "ardupilot"})
 
 
 def choose_mode(mode: Mode | None, target: str) -> Mode:
-    """Return the mode of a file: as asked, else ``in-use`` for a program that flies."""
+    """Return ``mode``; if it is None, ``in-use`` for a program that flies, else ``bench``."""
     return mode or ("in-use" if target in FLIGHT_TARGETS else "bench")
 
 
 def apply_mode(
     imu: Imu, target: Program, mode: Mode, measured: Mapping[str, InUseNoise] | None = None
 ) -> Imu:
-    """Return the noise of a sensor for a mode, with the mode in words.
+    """Set the mode of an export: raise the noise if ``in-use``, and store the mode in words.
 
-    ``measured`` is the noise in use by channel. Raises ExportError if neither it nor the authors of
-    the program say what noise is expected in use.
+    ``measured`` is the noise of a log in use by channel. Raises ExportError in use without such a
+    log, if the authors of the program recommend no noise either.
     """
     if mode != "in-use":
         return replace(imu, mode=texts.MODE_WORDS[mode])
@@ -115,8 +115,8 @@ def apply_mode(
         return _raise_to(imu, target, floors, 1.0, words)
     if target.name not in FLOORS:
         raise ExportError(
-            f"nobody recommends noise in use for {target.title}; expected --in-use LOG, a log of "
-            "the sensor with motors on or on the way"
+            f"the authors of {target.title} recommend no noise in use; add --in-use LOG, a log of "
+            "the sensor with motors on or under way"
         )
     floor = FLOORS[target.name]
     words = texts.floor_in_use(floor.source)

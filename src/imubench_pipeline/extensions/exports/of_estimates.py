@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def export_estimates(
     estimates: "Estimates", target: str, path: str | Path | None, options: Mapping[str, Any]
 ) -> str | bytes:
-    """Return the input file of a program for the estimates of a log, as of a run with this log."""
+    """Return the input file of a program for the estimates of a log; also write it to a path."""
     program = find_target(target)
     request = Request(
         sensor=estimates.log.sensor, target=target, method=estimates.method, **options

@@ -33,12 +33,12 @@ def export(
     path : str or Path, optional
         Where to write the file, too; a file there is replaced.
     rate : float or str
-        Of the samples that the program gets: Hz, or ``"100 Hz"``.
+        Rate of the samples that the program gets: Hz, or ``"100 Hz"``.
     name : str
-        Of the sensor, for the comments.
+        Name of the sensor, for the comments.
     mode : {"bench", "in-use"}, optional
-        As they are, or at least what the authors of the program use or recommend; by default
-        ``bench``, and ``in-use`` for programs that fly.
+        The models as they are (bench), or at least the noise that the authors of the program use
+        or recommend; by default ``in-use`` for programs that fly, else ``bench``.
     horizon : float or str
         Longest time without a measurement, s, for the replacement of terms that the program does
         not support.
@@ -50,8 +50,8 @@ def export(
     Raises
     ------
     ValueError
-        If the program is not known or cannot hold the noise (`ExportError`), or a setting cannot be
-        used.
+        If the program is not known or does not support the noise (`ExportError`), or a setting
+        cannot be used.
 
     Examples
     --------
@@ -62,9 +62,9 @@ def export(
     True
     """
     if unknown := set(models) - {"gyro", "accel"}:
-        raise ValueError(f"models has {min(unknown)!r}, expected gyro and accel")
+        raise ValueError(f"models: found {min(unknown)!r}, expected only 'gyro' and 'accel'")
     if mode == "bounded":
-        raise ValueError("a bound needs a log: expected Estimates.export")
+        raise ValueError("mode 'bounded' needs a log; use the method export of its Estimates")
     program = find_target(target)
     axes = {
         key: AxisNoise(models[key], "a given model") for key in ("gyro", "accel") if key in models

@@ -65,14 +65,14 @@ _ROUNDING_MARGIN = 1e-9
 
 @dataclass(frozen=True)
 class Limits:
-    """Lower limits of a model."""
+    """Limits that a model must not lie below, such as an Allan variance at several tau."""
 
     x: Array  # shape (m,); tau or time, s, or frequency, Hz
     value: Array  # shape (m,); lower limit there
     of_term: Callable[[noise.Term], Array]  # contribution of a term to the limited quantity at `x`
 
     def ratio(self, model: noise.NoiseModel) -> Array:
-        """Return the ratio of a model to its limit, shape (m,)."""
+        """Return the ratio of the limited quantity of a model to its limit, shape (m,)."""
         return np.asarray(np.sum([self.of_term(term) for term in model.terms], axis=0) / self.value)
 
 
@@ -116,7 +116,7 @@ def find_smallest(
         cost, powers = solved(place)
         T_B = math.exp(place)
     if not math.isfinite(cost):
-        raise ValueError(f"no model {family} lies above the limits")
+        raise ValueError(f"no model of the family {family} lies above all limits")
     powers = powers * (1.0 + _ROUNDING_MARGIN)
     B = noise.compute_bias_instability(float(powers[-1]), T_B) if T_B else 0.0
     K = math.sqrt(powers[1]) if walks else 0.0
@@ -189,7 +189,7 @@ _FLICKER_TAU_RATIO = 4.0
 
 @dataclass(frozen=True)
 class Overbound:
-    """A model that lies above its limits."""
+    """A noise model above the measured curve and its fit, with its range and its excess."""
 
     model: noise.NoiseModel
     band: tuple[float, float]  # lowest and highest frequency of the bounded density, Hz
@@ -205,7 +205,7 @@ def simultaneous_upper(curve: AllanCurve, longest: float) -> Array:
     """Return simultaneous upper 95 % confidence limits of an Allan variance.
 
     They follow from the limits at single tau by a Bonferroni correction for the number of octaves.
-    The true curve lies below the limits at every tau up to ``longest``, s, with this probability.
+    With 95 % probability, the true curve lies below the limits at every tau up to ``longest``, s.
     The limits are at every tau of the curve, shape (m,), in its unit squared.
     """
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]
@@ -335,7 +335,7 @@ def limits_of(
             f"the horizon of {horizon:g} s is shorter than two samples, or than {shortest:g} s"
         )
     if longest > curve.tau[-1] * (1.0 + 1e-9):
-        raise ValueError(f"the curve ends at {curve.tau[-1]:g} s, before {longest:g} s")
+        raise ValueError(f"the curve ends at {curve.tau[-1]:g} s, expected {longest:g} s or more")
     upper = simultaneous_upper(curve, longest)
     inside = (curve.tau >= shortest * (1.0 - 1e-9)) & (curve.tau < longest * (1.0 - 1e-9))
     tau = np.append(curve.tau[inside], longest)

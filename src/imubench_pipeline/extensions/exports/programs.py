@@ -34,7 +34,7 @@ _UNITS = {"gyro": {"x": "rad/s", "dx": "rad/s^2"}, "accel": {"x": "m/s^2", "dx":
 
 @dataclass(frozen=True)
 class Form:
-    """A way to state a parameter of a noise model."""
+    """A form in which programs take a noise parameter, such as a density or a variance."""
 
     formula: str  # in N, K, T_B, sigma_B of the process, the rate, and the horizon h
     si: str  # unit, where {x} is the unit of a reading and {dx} of its rate of change
@@ -131,7 +131,7 @@ class Program:
     def write(self, imu: Imu) -> str | bytes:
         """Return the content of the file.
 
-        Raises ExportError if the program needs a quantity without estimate, or a density above 0.
+        Raises ExportError if a needed quantity has no estimate, or a density is 0 but must not be.
         """
         return self.writer(imu) if self.writer else fill_layout(imu, self)
 
@@ -146,9 +146,9 @@ def declare(
     family: Family = "N+K",
     **more: Any,
 ) -> Program:
-    """Return a program, from rows of a form and the names of the numbers of gyro and accelerometer.
+    """Return a program; each row has a `Form` and the names of the gyro and accelerometer number.
 
-    Units of both may follow; SI by default. The name None is one number for both quantities.
+    Units of both may follow; SI by default. With None as second name, both share one number.
     """
     made = []
     for form, gyro, accel, *units in rows:
@@ -170,10 +170,10 @@ def declare(
 
 
 def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
-    """Return gyro and accelerometer as white noise and a random walk, or one process.
+    """Replace the models of gyro and accelerometer by models of the program's family.
 
-    For a program with numbers of each axis, these are the axes that have an estimate
-    (`imu.split_axes`). If one has a 0 that the program does not take, the chosen axis replaces it.
+    For a program with numbers of each axis, the result has each axis with an estimate
+    (`imu.split_axes`). The chosen axis replaces an axis with a 0 that the program does not take.
     Raises ExportError if a quantity is missing, or the chosen axis has such a 0.
     """
     imu.require_both()
@@ -199,7 +199,7 @@ def map_models(imu: Imu, program: Program) -> dict[str, Mapped]:
             chosen, against = map_axis(imu.axes[name.split()[0]])
             mapped[name] = replace(chosen, words=[*words, *chosen.words])
         if against:
-            raise ExportError(f"{name}: {against[0]}; a longer log, or an overbound, gives one")
+            raise ExportError(f"{name}: {against[0]}; use a longer log, or the mode bounded")
     return mapped
 
 
@@ -210,7 +210,7 @@ def describe(
     *,
     temperature: bool = False,
 ) -> list[str]:
-    """Return the header of the file of a program as printable statements.
+    """Return the sentences of the header of a program's file, all characters printable.
 
     `mapped`: the replacements of the models; `temperature`: the file contains the effect on the
     biases.
@@ -283,14 +283,14 @@ def format_decimal(value: float) -> str:
 
 
 def compute_values(entry: Entry, imu: Imu, mapped: Mapping[str, Mapped]) -> list[float]:
-    """Return the numbers of x, y and z; an axis without an estimate has the one of the chosen."""
+    """Return the numbers of x, y and z; the chosen axis replaces an axis without an estimate."""
     quantity = "gyro" if entry.quantity == "both" else entry.quantity
     models = [mapped.get(f"{quantity} {axis}") or mapped[quantity] for axis in AXES]
     return [entry.compute(one.model, imu.rate, imu.horizon) for one in models]
 
 
 def format_entries(program: Program, imu: Imu, mapped: Mapping[str, Mapped], of: str = "") -> str:
-    """Return numbers by the template `Program.line`; of one quantity if `of` names it.
+    """Return lines with the numbers, by the template `Program.line`; `of`: only one quantity.
 
     The template has ``{name}``, ``{x}``, ``{y}`` and ``{z}`` for the number of an axis or ``{xyz}``
     for three with commas, and ``{about}`` for formula and unit. A list in brackets becomes one
@@ -312,7 +312,7 @@ def format_entries(program: Program, imu: Imu, mapped: Mapping[str, Mapped], of:
 def fill_layout(
     imu: Imu, program: Program, remark: Callable[[Mapping[str, Mapped]], list[str]] | None = None
 ) -> str:
-    """Return a file by its template `Program.layout`; `remark` adds to its header.
+    """Return the file by the template `Program.layout`; `remark` returns further header lines.
 
     The template has ``{head}``, the header as comments; ``{lines}``, or ``{gyro}``, ``{accel}`` and
     ``{both}`` for the numbers; ``{rate}`` and ``{gravity}`` without an exponent; ``{topic}`` in

@@ -109,7 +109,7 @@ def clip_values(
     mapped: Mapping[str, Mapped],
     step: float,
 ) -> tuple[dict[str, float], list[str]]:
-    """Return the parameters of a filter with a step, s, within their ranges, and remarks."""
+    """Return a filter's parameters, clipped to ``ranges``, and a remark on each; ``step`` in s."""
     values: dict[str, float] = {}
     about = []
     for entry in program.entries:

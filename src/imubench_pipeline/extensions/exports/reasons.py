@@ -34,7 +34,7 @@ MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
 
 
 def value_kind(model: str, written: str, limited: bool) -> str:
-    """Return how a slow term was found; models as `NoiseModel.name`, ``limited``: from above."""
+    """Return how the slow terms of a file were found, by the names of fitted and written model."""
     if limited:
         source = "" if "K" in written.split("+") else "from the "
         return f"{source}upper limit of K: the log does not show it"
@@ -45,7 +45,7 @@ def value_kind(model: str, written: str, limited: bool) -> str:
 
 
 def limit_of_walk(K: float, horizon: float) -> str:
-    """Return that an upper limit of K, SI, at the horizon, s, is used."""
+    """Return a note that K, SI, is an upper limit from the Allan variance at the horizon, s."""
     return (
         f"no slow term is determined: K = {K:.3e} is the upper 95 % limit by the Allan variance at "
         f"{number_text(horizon)} s. A longer log gives a lower one"
@@ -65,7 +65,7 @@ def channel_in_use(
 
 
 def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
-    """Return the noise of a log in use; ``channels``: each in words, cut-off in Hz."""
+    """Return a note on a log in use; ``channels``: sentence of each, ``cutoff`` in Hz."""
     at = number_text(cutoff)
     return (
         f"IN USE: at least the broadband noise above {at} Hz of a log in use. Below {at} Hz all is "
@@ -75,18 +75,18 @@ def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
 
 
 def floor_in_use(source: str) -> str:
-    """Return that no log in use was measured, and whose figures are used."""
+    """Return a note that there is no log in use, and figures of ``source`` are used."""
     return f"IN USE, NOT MEASURED: at least {source}. Measure it with --in-use LOG"
 
 
 def raised(before: float, N: float, K: float) -> str:
-    """Return how the mode raised the densities, SI."""
+    """Return a note on N before and after the mode raised it, and on K (0: none), SI."""
     walk = f", K at least {K:.4e}" if K else ""
     return f"N is {N:.4e} in use, and {before:.4e} at rest{walk}"
 
 
 def pooled(channel: str, recordings: Sequence[str]) -> str:
-    """Return that a channel is the mean of several recordings of one device."""
+    """Return a note that a channel is the mean of several recordings of one device."""
     number = counted(len(recordings), "recording")
     return (
         f"mean of the spectra of {channel_name(channel)} in {number} of the device: "
@@ -97,7 +97,7 @@ def pooled(channel: str, recordings: Sequence[str]) -> str:
 def chosen_axis(
     channel: str, recording: str, method: str, rank: str, horizon: float, error: float, unit: str
 ) -> str:
-    """Return which axis represents a sensor; ``error`` after the horizon, s, in ``unit``."""
+    """Return a note on the axis that represents a sensor, with its error after the horizon, s."""
     times = number_text(horizon)
     return (
         f"{channel_name(channel)} of recording {recording} by method {method}, {rank} at "
@@ -107,7 +107,7 @@ def chosen_axis(
 
 
 def axis_rank(number: int, place: str, of: str = "", noun: str = "axis") -> str:
-    """Return the place of an axis, ``worst`` or ``median``; ``of``: its device, if asked for.
+    """Return the rank of the chosen axis; ``place``: worst or median; ``of``: its device.
 
     ``noun`` is ``axis``, or ``estimate`` if the estimates of one axis are compared.
     """
@@ -119,7 +119,7 @@ def axis_rank(number: int, place: str, of: str = "", noun: str = "axis") -> str:
 def axes_not_used(
     why: OtherAxes, horizon: float, of: Mapping[str, Sequence[str]], most: int
 ) -> str:
-    """Return which axes are not used; ``of``: channels by recording, the first ``most`` named."""
+    """Return a note on unused axes; ``of``: channels by recording; the first ``most`` are named."""
     named = [
         f"{join_names(list(map(channel_name, channels)))} of {recording}"
         for recording, channels in of.items()
@@ -176,7 +176,7 @@ def axis_slope(
     unit: str,
     lag: float | None,
 ) -> str:
-    """Return the effect of the temperature on an axis, in ``unit`` per K; lag in s."""
+    """Return a note on the temperature effect of an axis, in ``unit`` per K; ``lag`` in s."""
     lower, upper = (0.0 if limit is None else limit for limit in limits)
     bends = f", square {square:.3e} {unit}/K^2" if square else ""
     late = "no lag" if lag is None else f"a lag of up to {number_text(lag, 3)} s is not corrected"

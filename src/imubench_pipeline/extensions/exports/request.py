@@ -61,7 +61,7 @@ class Request:
 def load(path: Path) -> dict[str, pa.Table]:
     """Read the tables of a run from the folder of its results, or from ``tables`` in it.
 
-    Raises ExportError if a table is missing or of another form.
+    Raises ExportError if a table is missing, or has other columns.
     """
     try:
         paths = find_tables(path, NEEDED)
@@ -87,7 +87,7 @@ def make_content(tables: Tables, request: Request, recordings: Path | None = Non
 
 
 def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> imu.Imu:
-    """Return the noise of the sensor of a request (see `make_content`)."""
+    """Return the noise of the sensor that a request names; arguments as in `make_content`."""
     recordings = _select_rows(RecordingRow, tables, sensor=request.sensor)
     if not recordings:
         sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
@@ -250,7 +250,7 @@ def _list_larger_programs(family: Family) -> list[str]:
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
     """Return the curve of one channel from rows of ``allan``; ExportError without any."""
     if not rows:
-        raise imu.ExportError("the channel has no Allan variance")
+        raise imu.ExportError("the channel has no Allan variance; analyse a longer log of it")
     return AllanCurve(
         tau=np.array([row.tau for row in rows]),
         cluster_size=np.array([row.cluster_size for row in rows], dtype=np.int64),

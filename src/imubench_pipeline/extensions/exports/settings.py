@@ -9,7 +9,7 @@ from imubench_pipeline.settings.validation import Strict, Text
 
 
 class ExportSettings(Strict):
-    """Export files of every sensor for filters and simulators."""
+    """Files for filters and simulators that a run writes for every sensor."""
 
     targets: tuple[Text, ...] = Field(
         ("kalibr", "json"), description="programs; `imubench export` knows their names"

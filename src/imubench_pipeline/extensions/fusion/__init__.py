@@ -1,4 +1,4 @@
-"""Several sensors together: boards, a virtual IMU, and the number that equals a better sensor."""
+"""Several sensors as one: boards, a virtual IMU, and how many sensors equal one better sensor."""
 
 from imubench_pipeline.registry import Block, Extension
 

@@ -16,10 +16,10 @@ _SHARED_PARAMETERS = ("N", "B", "K", "R")  # that sensors may share, each the ro
 
 @dataclass(frozen=True)
 class Shared:
-    """One process, such as a temperature, that acts on several sensors with sensitivities."""
+    """A process, such as a temperature, that acts on all sensors, each with a sensitivity."""
 
     model: NoiseModel  # the process in its own unit, such as kelvin, at the fused rate
-    sensitivity: Sequence[float]  # SI unit of the sensors per that unit, one a sensor, with sign
+    sensitivity: Sequence[float]  # of each sensor, signed: its SI unit per unit of the process
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Parts:
     """Variances of the sensors of a board at several tau.
 
     The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. The parts are
-    stored separately, since the sum loses precision if the shared part is far the largest.
+    stored separately, since the sum loses precision if the shared part is by far the largest.
     """
 
     own: Array  # shape (m, n); independent part of each sensor, SI^2
@@ -35,7 +35,7 @@ class Parts:
     sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: Array) -> tuple[Array, Array]:
-        """Return the independent and shared variances of a sum, SI^2, (m,), with weights (n,)."""
+        """Return independent and shared variance of the sum with weights, (n,); SI^2, (m,) each."""
         alone = np.sum(self.own * weights**2, axis=1)
         return alone, np.sum(self.shared * (self.sensitivities @ weights) ** 2, axis=1)
 
@@ -70,7 +70,7 @@ class Board:
         for process in self.shared:
             sensitivity = np.asarray(process.sensitivity, dtype=np.float64)
             if sensitivity.shape != (len(self.models),) or not np.all(np.isfinite(sensitivity)):
-                raise ValueError("expected one finite sensitivity for every sensor")
+                raise ValueError(f"sensitivity is {sensitivity}, expected a number per sensor")
 
     @classmethod
     def alike(
@@ -80,7 +80,7 @@ class Board:
         rate: float,
         correlation: Mapping[str, float] | None = None,
     ) -> "Board":
-        """Return a board of equal sensors, at a rate in Hz; the correlation is as for `divided`."""
+        """Return a board of equal sensors, at a rate in Hz; ``correlation`` as in `divided`."""
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []
         return cls([own] * number, [rate] * number, shared)
@@ -108,15 +108,15 @@ class Board:
         )
 
     def check_weights(self, weights: Array) -> None:
-        """Raise ValueError unless the weights are one for each sensor, with the sum 1.
+        """Raise ValueError unless there is a weight for each sensor, and the sum is 1.
 
-        Then the common signal passes unchanged.
+        With this sum, the common signal passes unchanged.
         """
         if weights.shape != (self.sensors,) or not abs(weights.sum() - 1.0) <= 1e-9:
-            raise ValueError("expected a weight for each sensor, with a sum of 1")
+            raise ValueError(f"weights are {weights}, expected {self.sensors} with a sum of 1")
 
     def allan_parts(self, tau: ArrayLike) -> Parts:
-        """Return the Allan variances of the sensors at whole samples next to tau, s, shape (m,)."""
+        """Return the Allan variances of the sensors at tau, s, (m,), rounded to whole samples."""
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]

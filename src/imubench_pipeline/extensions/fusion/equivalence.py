@@ -39,11 +39,11 @@ def answer(
     draws: int,
     seed: int,
 ) -> Answer | str:
-    """Return the Allan variance of the median channel of a sensor at a tau, s; or why not.
+    """Return the Allan variance of a sensor's median channel at a tau, s; or why there is none.
 
     The candidates are all channels of one quantity; simulated ones are left out beside measured
     ones. ``correlation``: shared fraction of the variance of each parameter; ``longest``: largest
-    tau over the log; ``draws``: number of models drawn from the estimate.
+    tau as a fraction of the log; ``draws``: number of models drawn from the estimate.
     """
     measured = [channel for channel in candidates if not channel.simulated] or candidates
     long = [channel for channel in measured if tau <= longest * channel.duration]

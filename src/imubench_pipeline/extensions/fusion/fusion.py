@@ -47,7 +47,7 @@ def _yield_printed(datasheet: Datasheet, channel: str) -> Iterator[tuple[str | N
 def yield_grade_rows(
     candidates: Iterable[ComparedChannel], grades: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Yield the rows of ``grades``: the axis of median N of each sensor, each printed figure.
+    """Yield the rows of ``grades``: each sensor, by its axis of median N, and printed figure.
 
     `grades`: the sensors of the better class, by their names in the catalogue.
     """
@@ -146,7 +146,6 @@ def yield_candidates(
 def _temperature_parts(
     tables: Mapping[str, pa.Table],
 ) -> dict[tuple[str, str, str], TemperaturePart]:
-    """Return the removed temperature effect of channels."""
     curves: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
     for point in CompensatedAllanRow.rows_of(tables["allan_compensated"]):
         curves.setdefault(_channel(point), []).append((point.tau, point.temperature))
@@ -172,7 +171,7 @@ def yield_fusion_rows(
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
 ) -> Iterator[FusionRow]:
-    """Return the rows of the table ``fusion``; `tables` and `joint` as in `yield_candidates`."""
+    """Yield the rows of the table ``fusion``; `tables` and `joint` as in `yield_candidates`."""
     rows = equivalence_rows(
         yield_candidates(tables, joint),
         [parse_quantity(tau, "time") for tau in how.tau],
@@ -187,7 +186,7 @@ def yield_fusion_rows(
 def yield_grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Return the rows of the table ``grades``, including sensors not for sale, such as boards."""
+    """Yield the rows of the table ``grades``, including sensors not for sale, such as boards."""
     grades = {name: sensor for name, sensor in sensors.items() if sensor.grade == "tactical"}
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
     return yield_grade_rows(yield_candidates(tables, None, not_sold), grades)
@@ -196,7 +195,7 @@ def yield_grades_of_run(
 def write_fusion(
     inputs: Mapping[str, str], joint: list[Path], settings: str, catalogue: str, outputs: list[Path]
 ) -> None:
-    """Write the tables ``fusion`` and ``grades``, by the stems of ``outputs``, from ``inputs``."""
+    """Write ``fusion`` and ``grades`` to the ``outputs`` of these names, from tables and draws."""
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}

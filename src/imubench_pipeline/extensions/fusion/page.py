@@ -78,7 +78,7 @@ FUSION = Entry(
 
 
 def describe_common_errors(common: Mapping[str, float]) -> str:
-    """Return the assumptions on common errors: the common shares of the variance of N, B, K, R."""
+    """Return the assumptions on common errors; ``common``: shared fractions of the variances."""
     named = [
         f"{percent_text(share)} of the variance of the {_PARAMETER_TEXTS[name]} ({name})"
         for name, share in common.items()

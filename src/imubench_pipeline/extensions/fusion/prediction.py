@@ -36,9 +36,9 @@ class FusedCurve:
 def fused_allan(board: Board, weights: Array, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
-    It is the sum of w_i^2 AV_i and, of each shared process, of (w^T g)^2 AV. The tau are array_like
-    of shape (m,), s, rounded to whole fused samples, at least one. The weights have the shape (n,)
-    and the sum 1, or ValueError.
+    It is the sum of w_i^2 AV_i over the sensors, with weights w and Allan variances AV, and of
+    (w^T g)^2 AV over shared processes, with sensitivities g. ``tau``, s, shape (m,), is rounded to
+    whole fused samples. The weights have the shape (n,) and the sum 1, or ValueError.
     """
     board.check_weights(weights)
     alone, common = board.allan_parts(tau).of_sum(weights)
@@ -55,11 +55,11 @@ def prediction_limits(
     rng: np.random.Generator,
     level: float = 0.95,
 ) -> tuple[Array, Array]:
-    """Return limits, shapes (m,), of the predicted Allan deviation, by uncertain parameters.
+    """Return limits, (m,) each, of the predicted Allan deviation due to uncertain parameters.
 
-    `draw_models` draws the ``draws`` models of each estimate, of the noise of its sensor; sensors
-    with the same estimate are drawn together. Weights and shared parts are fixed. The tau are
-    array_like of shape (m,), s; ``level`` is the fraction of the boards between the limits.
+    `draw_models` draws ``draws`` models from the estimate of each sensor; sensors that share an
+    estimate share its draws. Weights and shared parts are fixed. ``tau`` is in s, shape (m,);
+    ``level`` is the fraction of the drawn boards between the limits.
     """
     drawn: dict[int, list[NoiseModel]] = {}
     for estimate, stream in zip(estimates, rng.spawn(len(estimates)), strict=True):

@@ -34,7 +34,7 @@ _TEMPERATURE_AVERAGING_TIME = 100.0  # averaging time of temperature readings, s
 def simulate_samples_of_models(
     folder: Path, sensor: str, recording: str, seed: int
 ) -> Iterator[ModelSampleRow]:
-    """Yield the rows of the table ``samples_of_models``; none of a rejected recording."""
+    """Yield the rows of the table ``samples_of_models``; none for a rejected recording."""
     logs = load_static_logs(folder)
     if not logs:
         return

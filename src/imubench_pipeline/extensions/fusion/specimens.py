@@ -51,7 +51,7 @@ def make_board(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Array]
 
 
 def fuse_models(models: Sequence[NoiseModel], weights: Array) -> NoiseModel:
-    """Return the noise of fused specimens with equal correlation times: roots of sum w^2 p^2."""
+    """Return the noise of fused specimens; a parameter p becomes the root of sum(w^2 p^2)."""
     ratios = [
         np.linalg.norm(weights * [getattr(model, name) for model in models])
         / (getattr(models[0], name) or 1.0)
@@ -99,7 +99,7 @@ def simulate_fused_blocks(
 
 
 def compute_fusion_factors(recording: SimulatedRecording, channel: str) -> dict[str, float]:
-    """Return the noise of fused specimens, over the noise of one, by parameter."""
+    """Return the ratio of the noise of fused specimens to the noise of one, by parameter."""
     models = [model.axes[channel].noise for model in make_specimens(recording)]
     of_kind = make_imu_model(recording.channels, recording).axes[channel].noise
     _, weights = make_board(models, parse_quantity(recording.rate, "frequency"))

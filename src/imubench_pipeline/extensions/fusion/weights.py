@@ -12,10 +12,11 @@ _MIN_VARIANCE_RATIO = 1e-14  # of a sensor without noise, over the noisiest one
 
 
 def best_weights(board: Board, tau: float | None = None) -> Array:
-    """Return the weights, shape (n,), of least Allan variance at a tau, s, by default N^-2.
+    """Return the constant weights, shape (n,), of least Allan variance at a tau, s.
 
-    With common parts, a weight may be negative: a sensor of large sensitivity compensates the
-    others. The tau is rounded to whole fused samples. Raises ValueError for a sensor without noise.
+    Without tau, N^2 is minimised. The weights are then as N^-2, if the sensors share no noise;
+    else a weight may be negative: a sensor more sensitive to the shared noise compensates others.
+    The tau is rounded to whole fused samples. Raises ValueError for a sensor without noise.
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])
@@ -24,7 +25,7 @@ def best_weights(board: Board, tau: float | None = None) -> Array:
     else:
         parts = board.allan_parts([tau])
     if not np.all(parts.own + parts.shared @ parts.sensitivities**2 > 0.0):
-        raise ValueError("a sensor without noise cannot be weighted by its noise")
+        raise ValueError("a sensor without noise has no weight; expected noise in every model")
     return np.asarray(least(parts)[0])
 
 
@@ -73,7 +74,7 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
 
 
 def fuse(board: Board, weights: Array, samples: Sequence[Array]) -> Array:
-    """Return the samples of the virtual sensor, shape (k,), of samples as of `at_fused_rate`.
+    """Return the samples of the virtual sensor, shape (k,); ``samples`` as in `at_fused_rate`.
 
     The weights have the shape (n,) and the sum 1, or ValueError.
     """

@@ -17,14 +17,14 @@ _TIME_TYPE = make_number_type(0.0, LONGEST, "a time, such as 10 s", parse_second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
     parser.description = "Arguments after -- go to snakemake, such as --workflow-profile DIR."
     parser.add_argument(
         "folder",
         type=Path,
         nargs="?",
-        help="folder folder of logs, or a checkout; default: this one",
+        help="folder of logs, or a checkout; default: this one",
     )
     parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
     parser.add_argument(

@@ -21,7 +21,7 @@ DifferenceKind = Literal[
 
 @dataclass(frozen=True)
 class ResultKey:
-    """Identify a result in a run."""
+    """The table, recording, channel and name that identify a result in a run."""
 
     table: str
     sensor: str

@@ -56,7 +56,7 @@ _PATH_SETTINGS = ("logs", "results", "held_back")
 _OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
 _LOW_DISK_SPACE = 200e6  # bytes
 _MAX_ERRORS = 5
-_CHANGED_WHILE_READ = "it was written to while it was read: what the results say is of a part of it"
+_CHANGED_WHILE_READ = "it was written to while it was read; the results may be of a part of it"
 
 
 def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
@@ -108,15 +108,15 @@ def _read_output(path: Path) -> str:
 class Night:
     """A run of the workflow of a project: a folder of logs, or a checkout.
 
-    ``config`` has settings ``key=value`` beyond its file, ``flags`` further flags of Snakemake. A
-    ConfigError is raised for another folder, or settings that cannot be read.
+    ``config``: settings ``key=value`` in addition to the file; ``flags``: further flags of
+    Snakemake. A ConfigError is raised if the folder is no project, or a setting cannot be read.
     """
 
     def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
         self.project = project.absolute()
         self._snakefile = find_snakefile(self.project)
         if own := set(flags) & _OWN_FLAGS:
-            raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
+            raise ConfigError(f"found {', '.join(own)} after --; expected --config before the --")
         file = self.project / "config/config.yaml"
         settings = dict(read_config(file))
         for entry in config:

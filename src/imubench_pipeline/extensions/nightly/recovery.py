@@ -20,7 +20,7 @@ _MAX_TERMINATION_TIME = 10.0  # s; for a process to end
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
-    """End the steps of a killed run, by its note, that run in `project`; return their number."""
+    """End steps of a killed run, by its lock note, that still run in `project`; return how many."""
     group = note.get("snakemake")
     if note.get("host") != platform.node() or not isinstance(group, int) or was_restarted(note):
         return 0
@@ -38,7 +38,7 @@ def end_left_over(note: Mapping[str, Any], project: Path) -> int:
 
 
 def end_group(group: int) -> None:
-    """Kill the remaining processes of a group that this run started, by its leader."""
+    """Kill the remaining processes of a process group that this run started, by its ID."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(group, signal.SIGKILL)
 
@@ -46,7 +46,7 @@ def end_group(group: int) -> None:
 def remove_doubtful(results: Path) -> int:
     """Remove the files of the last minute before a power failure; return their number.
 
-    Such a file may have its name without its content; a folder that one step makes goes as a whole.
+    Such a file may exist without its content. A folder that one step makes is removed as a whole.
     """
     stamps: dict[Path, float] = {}
     for path in walk_outputs(results):

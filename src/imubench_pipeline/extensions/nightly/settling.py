@@ -73,7 +73,7 @@ def scan_drop_zone(logs: Path) -> dict[str, Found]:
 
 
 def find_complete_name(name: str) -> str | None:
-    """Return the name of a partial file (.part, hidden, rsync) once complete; None if it is."""
+    """Return the final name of a partial file (.part, hidden, rsync); None for a complete file."""
     if name.startswith("._"):
         return None  # files of attributes that macOS adds
     whole = name.lstrip(".")

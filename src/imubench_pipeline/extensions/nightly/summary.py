@@ -38,7 +38,7 @@ class StateError(ValueError):
 
 
 class Known(NamedTuple):
-    """Digest of a recording, and what a run reports once."""
+    """Digest of the results of a recording, and the events that were reported already."""
 
     digest: str
     rejected: str | None = None  # the reason
@@ -63,7 +63,7 @@ class State(BaseModel):
         write_sealed_json(self.model_dump(mode="json"), path)
 
     def get(self, name: str) -> Known:
-        """Return what is known of a recording, possibly nothing."""
+        """Return the entry of a recording; an empty one if it is new."""
         return self.recordings.get(name, Known(""))
 
     def without(self, names: Collection[str], before: "State | None") -> "State":
@@ -125,7 +125,7 @@ def make_state(
     logs: Mapping[str, Signature],
     skipped: Mapping[str, datetime],
 ) -> State:
-    """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
+    """Return the state after a run, from its tables (`load_tables`) and the logs that it read."""
     rejected = {
         get_recording_name(row): row.reason or "no reason is recorded"
         for row in tables.recordings
@@ -199,7 +199,7 @@ class Rejected(BaseModel):
 
 
 class Changes(BaseModel):
-    """Changes since the last successful nightly run; without one that was read: failed."""
+    """Changes since the last successful nightly run; ``outcome`` is failed without tables."""
 
     outcome: Outcome = "failed"
     since: datetime | None = None  # end of the run that this one is compared with

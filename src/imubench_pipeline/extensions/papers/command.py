@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the lines; return the exit status."""
+    """Show the values that the papers print beside the results; return the exit status."""
     # Imported here, so that the other commands start fast.
     from imubench_pipeline.extensions.papers.printed import read_papers
     from imubench_pipeline.extensions.papers.tables import PublishedRow

@@ -26,7 +26,7 @@ _SINGLE_SENSOR, _FUSED_SENSOR, _FUSED_COUNT = "scc2130", "scc2130_x25", 25
 
 
 class Axis(Strict):
-    """An axis of Tables 2 to 7, and Table 1 of its sensor; in degrees."""
+    """Printed figures of an axis (Tables 2 to 7) and of its sensor (Table 1), in degrees."""
 
     sensor: str
     axis: str
@@ -50,7 +50,7 @@ class Axis(Strict):
         return Log(self.sensor, RECORDING, f"gyro_{self.axis}")
 
     def meeting(self, scaled: bool) -> float:
-        """Return the tau, s, at which the -1/2 line of N (or of the printed value) meets B."""
+        """Return tau, s, where the -1/2 line of N (``scaled``), or of ``psd``, meets the floor."""
         return ((self.density if scaled else self.psd) / self.floor) ** 2
 
 
@@ -68,7 +68,7 @@ def compute_cutoff(_: Evidence, bandwidth: str) -> float:
 
 
 def get_published_figure(run: Evidence, sensor: str, axis: str, parameter: str) -> Result | None:
-    """Return the estimate of a printed figure: bias, the -1/2 line at 1 h (N), or the floor (B)."""
+    """Return the estimate, SI, of a printed bias, -1/2 line at 1 h (N), or floor (B)."""
     one = AXES[sensor, axis]
     place = one.drift if parameter == "bias" else one.noise
     times = {"bias": 1.0, "N": 1.0 / math.sqrt(READ_AT), "B": FLOOR}[parameter]
@@ -110,14 +110,14 @@ def derive_from_axis(_: Evidence, sensor: str, axis: str) -> Result:
 
 
 def compare_axes(_: Evidence, sensor: str) -> Result:
-    """Return the noise of each axis of a sensor over the x axis, and over the datasheet."""
+    """Return the ratio of the noise of each axis of a sensor to the x axis and the datasheet."""
     axes = [axis for axis in AXES.values() if axis.sensor == sensor]
     over_x = {axis.axis: axis.psd / axes[0].psd for axis in axes}
     return Result(fields=over_x | {f"sheet_{one.axis}": one.density / one.sheet for one in axes})
 
 
 def compute_share_in_band(run: Evidence, sensor: str, axis: str) -> Result | None:
-    """Return the share of the curve within the band of logs of its estimate, %."""
+    """Return the percentage of a curve inside the band of logs simulated by its estimate."""
     log = AXES[sensor, axis].log
     for method in ("compensated", "likelihood"):
         bands = run.of_log(ReconstructionRow, log, method=method)
@@ -150,7 +150,7 @@ def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], 
 
 
 def compare_sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result | None:
-    """Return the ratio of the deviations of samples of the fitted model and of the log."""
+    """Return the standard deviation of samples of the fitted model divided by the log's."""
     by = _get_sample_deviations(run, sensor)
     ratios = [value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"]
     if not ratios:
@@ -163,7 +163,7 @@ def compare_sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> 
 
 
 def compare_deviations_with_x(run: Evidence, sensor: str) -> Result | None:
-    """Return the deviations of samples of y and z over x, of log and fitted model."""
+    """Return the standard deviations of y and z divided by the one of x, of log and model."""
     by = _get_sample_deviations(run, sensor)
     if not by:
         return None
@@ -180,7 +180,7 @@ def compare_deviations_with_x(run: Evidence, sensor: str) -> Result | None:
 
 
 def correlate_adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | None:
-    """Return the correlation of adjacent samples, of log and model."""
+    """Return the correlation of adjacent samples of the log, and of the model ``of``."""
     rows = run.rows(
         ModelSampleRow, sensor=sensor, recording=RECORDING, channel="gyro_x", what="stretch"
     )
@@ -202,7 +202,7 @@ def correlate_adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | 
 
 
 def count_equal(run: Evidence, grade: str, option: str) -> Result | None:
-    """Return the number of sensors that equals a grade, by white noise and by lowest point."""
+    """Return how many sensors together equal a grade, by white noise and by lowest point."""
     words = []
     for sensor, name in ((_SINGLE_SENSOR, ""), (_FUSED_SENSOR, f"of {_FUSED_COUNT} fused ")):
         rows = run.rows(

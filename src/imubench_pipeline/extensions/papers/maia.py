@@ -95,16 +95,16 @@ Range = tuple[float, float, float]  # the quantiles of 5, 50 and 95 %, SI
 
 @dataclass(frozen=True)
 class Lottery:
-    """Scores of single reconstructions against single logs of Table 2, for one grid of tau."""
+    """RMS, as in Table 3, of single reconstructions against single logs, for one grid of tau."""
 
     ranges: tuple[Range, Range]  # reconstructed by Table 1, and by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
-    beyond: tuple[float, float]  # shares of them at least as large as the printed figures
+    beyond: tuple[float, float]  # shares of the scores that are at least the printed figures
     slow: float  # share of the mean square from tau beyond 300 s, by Table 2
 
 
 def choose_cluster_sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
-    """Return the cluster sizes of a grid of `GRIDS`, or ("read") of reading a curve, shape (m,)."""
+    """Return the cluster sizes of a grid in `GRIDS`, or for "read", to read a curve, shape (m,)."""
     longest = round(DURATION * channel.rate) // 2
     if grid == "steps":
         steps = np.outer(10 ** np.arange(len(str(longest))), np.arange(1, 10)).ravel()
@@ -118,7 +118,7 @@ def choose_cluster_sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
 
 @cache
 def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
-    """Return the spread of Table 3: each of `MEMBERS` logs of Table 2 against reconstructions."""
+    """Simulate the scatter of the RMS of Table 3: `MEMBERS` logs of Table 2, reconstructed."""
     n = choose_cluster_sizes(channel, grid)
     measured, *drawn = (curves[grid] for curves in _simulate_deviations(channel))
     of_each = [rms(one[:, None, :], measured[None, :, :]) for one in drawn]
@@ -140,7 +140,7 @@ def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
 
 @cache
 def simulate_readings(channel: Channel) -> dict[str, Range]:
-    """Return the parameters read from curves of single logs of Table 2 (N at 1 s, K at a ninth)."""
+    """Return parameters read from curves of logs of Table 2 (N at 1 s, K at a ninth of a log)."""
     tau = choose_cluster_sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {
@@ -216,7 +216,7 @@ def _describe(row: ParameterRow | None, what: str) -> str:
 
 
 def get_optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | None:
-    """Return the results of optimisation and likelihood for the simulated log."""
+    """Return the estimates by optimisation and by likelihood from the simulated log."""
     log = CHANNELS[key].log
     row = run.parameter(log, symbol, "paper")
     if row is None:
@@ -244,7 +244,7 @@ def read_curve(run: Evidence, key: str, symbol: str) -> Result:
 
 
 def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
-    """Return tau or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B, SI."""
+    """Return tau or deviation of the lowest point by Table 1, and 1.89 T_B or 0.664 B, SI."""
     model = CHANNELS[key].table_1
     assert model.T_B is not None
     tau, level = find_lowest_point(model)
@@ -262,7 +262,7 @@ def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
 
 
 def compute_error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
-    """Return the error of dead reckoning by the noise of one channel, and the one for Table 2."""
+    """Return the dead-reckoning error after 600 s by the noise of Table 1, and of Table 2."""
     channel = CHANNELS[key]
     quiet = NoiseModel()
 
@@ -316,7 +316,7 @@ def _count_in_range() -> dict[str, int]:
 
 
 def compute_chance_of_order(_: Evidence, key: str) -> Result:
-    """Return the chance that a reconstruction by Table 1 has the lower RMS."""
+    """Return the chance that a reconstruction by Table 1 has a lower RMS than one by Table 2."""
     steps, every = (simulate_lottery(CHANNELS[key], grid) for grid in GRIDS)
     return Result(
         value=round(steps.beats, 2),  # so few draws do not resolve a smaller share
@@ -340,7 +340,7 @@ def convert_vendor_figure(_: Evidence, symbol: str, key: str) -> float:
 
 
 def compare_with_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
-    """Return N, or the lowest point (B), over the vendor's figure; N or B over Table 4."""
+    """Return the ratio of N, or the lowest point (B), to the vendor's figure, and to Table 4."""
     channel, vendor = CHANNELS[key], convert_vendor_figure(run, symbol, key)
     model = channel.table_1 if table == "table_1" else channel.table_2
     if symbol == "N":
@@ -393,7 +393,7 @@ def find_largest_ratio(_: Evidence, better: str, worse: str) -> Result:
 
 
 def compute_datasheet_line(_: Evidence, key: str) -> Result:
-    """Return the line N / sqrt(tau) of the datasheet at 1 s over the optimised curve."""
+    """Return the ratio of the datasheet's line N / sqrt(tau) to the optimised curve at 1 s."""
     curve = math.sqrt(float(CHANNELS[key].table_2.allan_variance(1.0)))
     ratio = read_manufacturer("N", key) / curve
     return Result(value=ratio, fields={"one_sided": ratio / math.sqrt(2.0)})
@@ -409,7 +409,7 @@ def compute_datasheet_floor(_: Evidence, key: str) -> Result:
 def integrate_density(model: NoiseModel, tau: float) -> float:
     """Return the Allan variance at a tau, s, by integration of the density, as a reference.
 
-    4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, with x = π f τ.
+    It is 4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, integrated over x = π f τ.
     """
     # The random walk is steep at 0. White noise converges slowly: its tail has the mean 3/8 of
     # sin⁴.
@@ -434,7 +434,10 @@ def evaluate_as_printed(model: NoiseModel, tau: float) -> float:
 
 
 def compute_weight_ratios(tau: float) -> tuple[float, float]:
-    """Return the spread at a tau, s, over the intended weight, 2 √(n/2L) σ̂², and the printed."""
+    """Return the ratios of the spread at a tau, s, to the weights as meant and as printed.
+
+    These are 2 √(n/2L) σ̂² and 2 √(n/2L) σ̂, with n samples in a cluster and L in the log.
+    """
     samples, n = round(DURATION * _RATE), round(tau * _RATE)
     variance = float(_MODEL.allan_variance(tau, _RATE))
     spread = math.sqrt(compute_variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])
@@ -475,7 +478,7 @@ def compute_spread_over_weight(_: Evidence) -> Result:
 
 
 def evaluate_sign(_: Evidence) -> Result:
-    """Return the error of equation 26 as meant, and the ratio as printed, against the density."""
+    """Return the error of equation 26 with the right sign, and its ratio to truth as printed."""
     truth = integrate_density(_MODEL, _DEFAULT_TAU)
     ours = abs(float(_MODEL.allan_variance(_DEFAULT_TAU)) / truth - 1.0)
     ratio = evaluate_as_printed(_MODEL, _DEFAULT_TAU) / truth

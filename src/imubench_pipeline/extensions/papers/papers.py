@@ -42,9 +42,9 @@ Values = Mapping[str, float | None]
 
 
 def make_accuracy_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
-    """Yield the rows of the table ``accuracy``, of the methods on simulated logs of one channel.
+    """Yield the rows of the table ``accuracy``: errors of the methods on simulated logs.
 
-    It is the gyro of the MTi-7 by Table 2 of Maia et al., for 10 h at a tenth of its rate, which
+    These are of the gyro of the MTi-7 by Table 2 of Maia et al., 10 h at a tenth of its rate, which
     does not change N, B, T_B and K. The likelihood has the model of the papers.
     """
     model = MTI_GYRO.table_2
@@ -106,7 +106,7 @@ _MODULES = {module.__name__.rpartition(".")[2]: module for module in (engers, ma
 
 
 def evaluate(line: Line, evidence: Evidence) -> Result:
-    """Return the counterpart of a line: a number (SI) or the result of a function, if any."""
+    """Return the result of this project for a line of a paper; empty if the line names none."""
     if not line.find:
         return Result()
     name, *arguments = (part.format(**line.fields) for part in line.find)
@@ -120,7 +120,7 @@ def evaluate(line: Line, evidence: Evidence) -> Result:
 
 
 def judge(printed: float | None, result: Result, tolerance: float) -> Verdict:
-    """Return the verdict on a printed number from the numbers of the result."""
+    """Return whether a printed number is in the interval of the result, or near its value."""
     if result.value is None or printed is None:
         return "not available"
     inside = (

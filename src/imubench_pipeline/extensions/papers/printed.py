@@ -150,7 +150,7 @@ class Log(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Counterpart of a line: a number, a text, or numbers for the texts of the line."""
+    """Result for a line of a paper: a number, a text, or numbers for the texts of the line."""
 
     value: float | None = None  # SI
     lower: float | None = None  # of an interval, SI
@@ -187,7 +187,7 @@ class Evidence:
         return self.rows(of, **log._asdict(), **where)
 
     def parameter(self, log: Log, name: str, method: str | None = None) -> ParameterRow | None:
-        """Return the estimate of a parameter's first component, by default the recommended one."""
+        """Return the estimate of a parameter (component 1) by a method; None: the recommended."""
         by: dict[str, object] = {"recommended": True} if method is None else {"method": method}
         rows = self.of_log(ParameterRow, log, parameter=name, component=1, **by)
         return rows[0] if rows else None

@@ -51,7 +51,7 @@ def count_covariance_steps(_: Evidence) -> Result:
 
 
 def get_estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None:
-    """Return an estimate of the log at rest."""
+    """Return the estimate of a parameter by a method, from the log at rest."""
     row = run.parameter(AT_REST, name, method)
     if row is None:
         return None
@@ -86,14 +86,14 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 
 @cache
 def make_printed_run(run: str) -> PrintedRun:
-    """Return a printed run, and the sigma of the mean over pairs by the printed noise."""
+    """Return a printed run, with the sigma that the printed noise gives the mean over pairs."""
     duration = 60.0 * PAPER_MINUTES[run]
     sigma = compute_allowed_sigmas(design_paper_run(PAPER_MINUTES[run]), PAPER_MODEL).sigma
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
 def compute_error_in_sigma(_: Evidence, run: str) -> Result:
-    """Return the error of a printed estimate over the noise of the mean over pairs."""
+    """Return the error of a printed estimate, in standard deviations of the mean of pairs."""
     printed = make_printed_run(run)
     return Result(fields={"off": (printed.value - EARTH_RATE) / printed.sigma})
 
@@ -185,7 +185,7 @@ def summarise_settling(evidence: Evidence, run: str) -> Result | None:
 
 @cache
 def read_values(hours: int) -> Mapping[str, tuple[float, ...]]:
-    """Return the parameters read from the curves of `LOGS` logs, SI, without missing ones."""
+    """Return the parameters read from `LOGS` logs of ``hours`` h, SI, without missing values."""
     shown: dict[str, list[float]] = {name: [] for name in PARAMETERS}
     for number in range(LOGS):
         rng = channel_rng(1, SENSOR, "gyro_x", f"{hours} h, {number}")
@@ -210,7 +210,7 @@ def read_weeks(run: Evidence, name: str) -> Result | None:
 
 
 def compute_error_of_mean(_: Evidence) -> Result:
-    """Return errors of the Earth's rate, deg/h: of 1000 samples by the start, and of one pair."""
+    """Return the sigma of the Earth's rate, deg/h, from 1000 samples by P_0, and from one pair."""
     hour = DEGREE / 3600.0
     along_axis = {
         name: float(known_rate.mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])

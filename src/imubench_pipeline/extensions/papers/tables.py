@@ -25,7 +25,7 @@ class PublishedRow(TableRow):
     unit: Annotated[str, "SI unit of the numbers"]
     printed_unit: Annotated[str, "unit in which the paper prints it"]
     scale: Annotated[float, "one printed unit", "as in unit"]
-    basis: Annotated[str, "basis of the result: come back, simulated, computed or checked"]
+    basis: Annotated[str, "basis of the result: round trip, simulated, computed or checked"]
     verdict: Annotated[
         str, "agrees, differs, possible, refuted, misprint, new result or not available"
     ]

@@ -14,4 +14,4 @@ TERMS = register_terms(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWal
 """Every kind of noise term, in the order of a model's name."""
 
 PARAMETERS = {parameter.symbol: parameter for kind in TERMS for parameter in kind.parameters}
-"""Every parameter of these by its symbol; flicker noise and a Gauss-Markov process share B."""
+"""Every parameter of the terms by its symbol; flicker noise and Gauss-Markov process share B."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Role(Enum):
-    """Representation of a term in filters and simulators, most of which have few terms."""
+    """Kind of noise by which filters and simulators represent a term; most know few kinds."""
 
     WHITE = "white noise"
     RANDOM_WALK = "a random walk"
@@ -77,7 +77,7 @@ class Process:
 
 @dataclass(frozen=True)
 class Drive:
-    """Input of a term to a filter after it."""
+    """Noise that one term adds at the input of a filter."""
 
     white: float = 0.0  # density N^2, SI^2/Hz
     flicker: float = 0.0  # B of flicker noise, SI
@@ -86,7 +86,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Reading:
-    """The point of a curve that shows a parameter."""
+    """The point of an Allan deviation at which a parameter can be read."""
 
     tau: float
     level: float
@@ -100,7 +100,7 @@ class Reading:
 class SampleBlocks:
     """Blocks of samples of a log; the arrays have the shape (b,)."""
 
-    # start, stop: first sample of the log, and the one past the last
+    # start, stop: first and one-past-last sample of each block, counted in the log
     start: NDArray[np.int64]
     stop: NDArray[np.int64]
     count: NDArray[np.int64]  # samples that are present
@@ -116,8 +116,9 @@ class SampleBlocks:
 class Term(ABC):
     """One noise process of a model; frequencies in Hz, tau and interval in s, results SI.
 
-    A term is a frozen dataclass of its parameters. What is abstract here, and the class variables
-    without a value, are its own; `register_terms` refuses a term that lacks one.
+    A term is a frozen dataclass of its parameters. Each kind defines the abstract methods and the
+    class variables that have no value here; `register_terms` refuses an incomplete kind. In
+    formulas, T is ``interval`` or 1 / ``rate``, n a number of samples, k a lag, d ``block``.
     """
 
     symbol: ClassVar[str]
@@ -127,8 +128,8 @@ class Term(ABC):
     """In words, such as ``white noise``."""
 
     standard_name: ClassVar[str]
-    """The field's name; ``{signal}`` and ``{integral}``: rate and angle, or acceleration and
-    velocity."""
+    """Name in standards; ``{signal}`` and ``{integral}`` are filled in: rate and angle, or
+    acceleration and velocity."""
 
     word: ClassVar[NoiseSource]
     """Its code as the source of an error (`model.states.NoiseSource`)."""
@@ -146,7 +147,7 @@ class Term(ABC):
 
     @abstractmethod
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Allan variance of the sampled process at n samples a cluster, SI^2."""
+        """Allan variance of the sampled process at n samples per cluster, SI^2."""
 
     @abstractmethod
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
@@ -154,7 +155,7 @@ class Term(ABC):
 
     @abstractmethod
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Covariance of sums of samples at lags, SI^2, up to a constant and a square of the lag."""
+        """Covariance of cumulative sums at lags, SI^2, up to a + b lag^2; n: cluster size."""
 
     @abstractmethod
     def state_space(self, interval: float) -> StateSpace:
@@ -167,7 +168,7 @@ class Term(ABC):
     @property
     @abstractmethod
     def drive(self) -> Drive | None:
-        """Input to a filter after it; None if it has no density, or arises after the filter."""
+        """Noise at the input of a filter; None if it has no density or arises after the filter."""
 
     @abstractmethod
     def growth(self, order: int, time: float, start: SensorStart) -> float:
@@ -178,10 +179,10 @@ class Term(ABC):
         """
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral from a known state.
+        """Return the variances of its first and second integral over a time, from a known state.
 
-        0 by default: it does not grow, a filter with the term predicts it exactly, or there is no
-        finite state that could be known.
+        By default 0: the term does not grow, or a filter with the term predicts it exactly, or it
+        has no finite state.
         """
         return np.zeros_like(time), np.zeros_like(time)
 
@@ -205,15 +206,16 @@ class Term(ABC):
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
         """Draw the sums over adjacent blocks of ``width`` samples of a simulated log, exactly.
 
-        By default jointly with the one state of the term; TypeError if it has another number.
+        By default for a term with one state; raises TypeError for another number of states.
         """
         space = self.state_space(1.0 / rate)
         if len(space.output) != 1:
-            raise TypeError(f"{self} has {len(space.output)} states; expected one")
+            count = len(space.output)
+            raise TypeError(f"{self} has {count} states; expected one, or its own block_sums()")
         return draw_block_sums(space, self.start(rng, 1.0 / rate), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading | None:
-        """Return where a curve, lowest at a tau in s, shows its parameter; None: nowhere."""
+        """Return where to read the parameter on a curve that is lowest at a tau, s; or None."""
         return None
 
     @property
@@ -232,11 +234,11 @@ class Term(ABC):
         return None
 
     def realised(self, interval: float, longest: float) -> "Sequence[Term]":
-        """Return terms with a finite state space that approximate it up to a tau ``longest``, s."""
+        """Return terms with finite states that approximate it from ``interval`` to ``longest``."""
         return [self]
 
     def scaled(self, factor: float) -> Self:
-        """Return the term of a signal that is larger by a factor; times do not change."""
+        """Return the term of the signal multiplied by a factor; times do not change."""
         scaled = {
             parameter.symbol: getattr(self, parameter.symbol) * factor**parameter.signal
             for parameter in self.parameters
@@ -245,24 +247,24 @@ class Term(ABC):
         return replace(self, **scaled)
 
     def as_unit(self) -> "tuple[float, Term]":
-        """Return a power and a term of the kind that times this power is this term.
+        """Return a factor, and a unit term whose variances times the factor are this term's.
 
-        By default 1 and itself. If one parameter scales the term, the other serves all models.
+        By default 1 and itself. If one parameter scales a kind, all its terms share the unit term.
         """
         return 1.0, self
 
     def sources(
         self, order: int, time: float, start: SensorStart
     ) -> Iterator[tuple[SourcePath | None, float]]:
-        """Yield path and standard deviation of its contributions to an error, see `growth`."""
+        """Yield path and standard deviation of each contribution to an error (see `growth`)."""
         yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over ``time`` from ``on_time`` since switch-on, s."""
+        """Return the variance of its mean over ``time`` that begins ``on_time`` after power-on."""
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
-        """Draw the first state, shape (m,)."""
+        """Draw the initial state, shape (m,)."""
         space = self.state_space(interval)
         root = factor_covariance(space.initial_variance)
         return space.initial_mean + root @ rng.standard_normal(len(root))
@@ -274,7 +276,7 @@ class Deterministic(Term):
 
     @abstractmethod
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return mean square and frequency, Hz, of a weighted sum of means over blocks, s."""
+        """Return mean square and frequency, Hz, of a weighted sum of means over ``block``, s."""
 
     @property
     def drive(self) -> Drive | None:
@@ -291,7 +293,7 @@ class Deterministic(Term):
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Raise TypeError: it is deterministic (see `swing`)."""
-        raise TypeError(f"{self} is deterministic")
+        raise TypeError(f"{self} is deterministic and has no covariance; use swing()")
 
 
 @dataclass(frozen=True)
@@ -323,29 +325,30 @@ _REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "para
 def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     """Return the kinds of terms, after checking that each is complete.
 
-    Raises TypeError if a kind lacks a method, a class variable or a search range of a time
-    constant, its parameters are not its fields, or two kinds share a symbol or a word, or a symbol
-    of different parameters.
+    Raises TypeError if a kind lacks a method, a class variable or the search range of a time
+    constant; if its parameters are not its fields; if two kinds share a symbol or a word; or if
+    two different parameters share a symbol.
     """
     for kind in kinds:
         name = kind.__name__
         if inspect.isabstract(kind):
             missing = ", ".join(sorted(kind.__abstractmethods__))
-            raise TypeError(f"the noise term {name} lacks {missing}")
+            raise TypeError(f"the noise term {name} lacks {missing}; implement these methods")
         lacking = [variable for variable in _REQUIRED_VARIABLES if not hasattr(kind, variable)]
         if lacking:
             raise TypeError(f"the noise term {name} lacks the class variable {', '.join(lacking)}")
         symbols = [parameter.symbol for parameter in kind.parameters]
         own = [field.name for field in fields(kind)]
         if symbols != own:
-            raise TypeError(f"the noise term {name} states the parameters {symbols}, and has {own}")
+            raise TypeError(f"the noise term {name} has parameters {symbols}, but fields {own}")
         for parameter in kind.parameters:
             if (parameter.signal, parameter.seconds) == (0.0, 1.0) and parameter.search is None:
                 raise TypeError(
-                    f"{parameter.symbol} of {name} is a time, without the range of a search"
+                    f"{parameter.symbol} of {name} is a time without a range for its search; set "
+                    "search=SearchRange(...)"
                 )
         if (kind.role is Role.GAUSS_MARKOV) != (kind.gauss_markov is not Term.gauss_markov):
-            raise TypeError(f"the role of {name} and its process (`gauss_markov`) are not the same")
+            raise TypeError(f"{name} has the role GAUSS_MARKOV or `gauss_markov`; expected both")
     for name in ("symbol", "word"):
         stated = [getattr(kind, name) for kind in kinds]
         for value in stated:
@@ -355,5 +358,6 @@ def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     for kind in kinds:
         for parameter in kind.parameters:
             if parameters.setdefault(parameter.symbol, parameter) != parameter:
-                raise TypeError(f"{parameter.symbol} is another parameter in {kind.__name__}")
+                symbol, name = parameter.symbol, kind.__name__
+                raise TypeError(f"{symbol} of {name} is not {symbol} of another term; rename it")
     return kinds

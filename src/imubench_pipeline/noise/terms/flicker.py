@@ -42,13 +42,16 @@ It is e^-a times a polynomial of e^-2a with these coefficients.
 
 _MEMBERS_PER_DECADE = 2.5
 _POINTS_PER_DECADE = 20
-_LAST_TIME_FACTOR = 4.0  # of the longest correlation time, over the one with its peak at the end
+_LAST_TIME_FACTOR = 4.0  # longest correlation time over the one that peaks at the end
 _MAX_EXACT_SIZE = 1 << 12  # largest cluster with an exact sum for the Allan variance
 
 
 @dataclass(frozen=True)
 class Flicker(Term):
-    """Flicker noise, 1/f, with B as in IEEE Std 952; `fit_flicker_bank` has finite states."""
+    """Flicker noise, 1/f, with B as in IEEE Std 952.
+
+    `fit_flicker_bank` approximates it by Gauss-Markov processes, which have finite states.
+    """
 
     B: float
     symbol = "F"
@@ -59,15 +62,15 @@ class Flicker(Term):
     parameters = (gauss_markov.BIAS_INSTABILITY,)
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
-        """B^2 / (2 pi f)."""
+        """Return B^2 / (2 pi f)."""
         return self.B**2 / (2.0 * np.pi * np.abs(frequency))
 
     def allan_variance(self, tau: Array) -> Array:
-        """(2 ln 2 / pi) B^2 at every tau."""
+        """Return (2 ln 2 / pi) B^2 at every tau."""
         return gauss_markov.FLOOR**2 * self.B**2 * np.ones_like(tau)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
+        """Return 2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
         table = _tabulate_integrals()
         # 1/sin^3(x) = 1/x^3 + 1/(2x) + ...: the second term adds (3/16) ln n and a constant.
         most, growth = _MAX_EXACT_SIZE, 3.0 / 16.0
@@ -77,11 +80,11 @@ class Flicker(Term):
         return 2.0 / np.pi * self.B**2 * np.where(n <= most, table[index - 1] / index**2, large)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """B^2 / sqrt(2 - 2 cos(omega))."""
+        """Return B^2 / sqrt(2 - 2 cos(omega))."""
         return self.B**2 / np.abs(2.0 * np.sin(omega / 2.0))
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """-B^2 / (4 pi) times the integral of (1 - cos(2 k x)) / sin^3(x) from 0 to pi/2.
+        """Return -B^2 / (4 pi) times the integral of (1 - cos(2 k x)) / sin^3(x) from 0 to pi/2.
 
         For long lags it is B^2 / (2 pi) k^2 ln(k), as in continuous time. A multiple of k^2 is left
         out. All lags of a call use the same formula.
@@ -95,30 +98,30 @@ class Flicker(Term):
 
     def state_space(self, interval: float) -> StateSpace:
         """Raise ValueError: there is no finite state space."""
-        raise ValueError("flicker noise has no finite state space; take its Gauss-Markov bank")
+        raise ValueError("flicker noise has no finite state space; use realised() to approximate")
 
     @property
     def drive(self) -> Drive:
-        """B of flicker noise."""
+        """Flicker noise of this B."""
         return Drive(flicker=self.B)
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return its `fit_flicker_bank`."""
+        """Return the Gauss-Markov processes, and white noise, of `fit_flicker_bank`."""
         return fit_flicker_bank(self.B, interval, longest)
 
     def as_unit(self) -> tuple[float, Term]:
-        """B^2 and B = 1."""
+        """Return B^2, and the term with B = 1."""
         return self.B**2, Flicker(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """B^2 t^(2m+2) times `integrate_after_window` or `integrate_since_switch_on`."""
+        """Return B^2 t^(2m+2) times `integrate_after_window` or `integrate_since_switch_on`."""
         scale = self.B**2 * time ** (2 * order + 2)
         if isinstance(start, Calibrated):
             return scale * integrate_after_window(order, start.window / time)
         return scale * integrate_since_switch_on(order, start.on_time / time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """-(B^2 / pi) times the second difference of k^2 (ln k - 3/2) / 2."""
+        """Return -(B^2 / pi) times the second difference over k of k^2 (ln k - 3/2) / 2."""
         k = np.maximum(lags, 1.0)
         far = np.maximum(k, _MIN_LAG_FOR_SERIES)
         series = np.log(far) - 1.0 / (12.0 * far**2) - 1.0 / (60.0 * far**4)
@@ -134,15 +137,15 @@ class Flicker(Term):
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
         """Raise TypeError: it has no covariance."""
-        raise TypeError("flicker noise has no covariance; take its Gauss-Markov bank")
+        raise TypeError("flicker noise has no covariance; use realised() to approximate it")
 
     def reading(self, lowest_tau: float) -> Reading:
-        """0.664 B at every tau; read where the curve is lowest."""
+        """Return 0.664 B, the level at every tau, read where the curve is lowest."""
         return Reading(lowest_tau, gauss_markov.FLOOR * self.B, "B", gauss_markov.FLOOR)
 
     @property
     def in_words(self) -> str:
-        """B."""
+        """The value of B, SI, in words."""
         return f"flicker noise B = {self.B:.3e}"
 
 
@@ -160,7 +163,7 @@ def fit_flicker_bank(B: float, interval: float, longest: float) -> list[Term]:
     ``interval`` to ``longest``, s; ValueError if it is empty.
     """
     if not 0 < interval < longest:
-        raise ValueError(f"the band from {interval} to {longest} s is empty")
+        raise ValueError(f"tau is {interval} to {longest} s, expected 0 < interval < longest")
     times, levels, white = _fit_unit_bank(round(math.log10(longest / interval), 6))
     terms: list[Term] = [
         gauss_markov.GaussMarkov(B * level, interval * time)
@@ -204,12 +207,12 @@ def _tabulate_sums() -> Array:
 
 
 def integrate_since_switch_on(order: int, on_time: float) -> float:
-    """Return the variance of the (m+1)-fold integral over a unit of time, for B = 1, m to 2.
+    """Return the variance of the (m+1)-fold integral over a unit of time, for B = 1.
 
-    It is 1 / ((2m+2) Gamma(m+3/2)^2) from the driving noise during the motion, and a combination of
-    a and e^(-2a), e^(-4a) ... from the driving noise before it. Here sinh^2(a) = on_time, the time
-    from switch-on to the motion over the length of the motion. For m = 0 it is (2/pi) (1 + a - (1 -
-    e^(-4a)) / 4).
+    The ``order`` m is 0 to 2. The driving noise during the motion adds 1 / ((2m+2) Gamma(m+3/2)^2),
+    the noise before the motion a combination of a, e^(-2a), e^(-4a) ... Here sinh^2(a) is
+    ``on_time``, the time from switch-on to the motion divided by the length of the motion. For
+    m = 0 the variance is (2/pi) (1 + a - (1 - e^(-4a)) / 4).
     """
     angle = math.asinh(math.sqrt(on_time))
     logarithmic, decaying = _expand_before_motion(order)
@@ -221,8 +224,8 @@ def integrate_since_switch_on(order: int, on_time: float) -> float:
 def integrate_after_window(order: int, window: float) -> float:
     """Return the variance of the (m+1)-fold integral less the mean over a window, for B = 1.
 
-    The integral is over a unit of time directly after the window; m is 0 to 2. For m = 0 and a
-    window r it is
+    The integral is over a unit of time directly after the window; ``order`` m is 0 to 2. For m = 0
+    and a ``window`` of r such units it is
 
         (1/pi) (1 + r) (ln(1 + 1/r) + ln(1 + r) / r),
 

@@ -68,27 +68,27 @@ class GaussMarkov(base.Term):
         return self.density * self.T_B / 2.0
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
-        """S_B T_B^2 / (1 + (2 pi f T_B)^2)."""
+        """Return S_B T_B^2 / (1 + (2 pi f T_B)^2)."""
         return self.density * self.T_B**2 / (1.0 + (2.0 * np.pi * frequency * self.T_B) ** 2)
 
     def allan_variance(self, tau: Array) -> Array:
-        """Maia et al., eq. 26, with the sign corrected: e^(-tau/T_B)."""
+        """Return eq. 26 of Maia et al., with the sign corrected: e^(-tau/T_B)."""
         return self.density * evaluate_gauss_markov_shape(tau, self.T_B)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Exact for samples of the process, from the sum of its covariances."""
+        """Return the exact value for samples of the process, from the sum of its covariances."""
         return self.density * evaluate_sampled_shape(n, interval, self.T_B)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """(S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
+        """Return (S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
         p = math.exp(-interval / self.T_B)
         gap = math.expm1(-interval / self.T_B) ** 2 + p * 4.0 * np.sin(omega / 2.0) ** 2
         return -self._variance * math.expm1(-2.0 * interval / self.T_B) / gap
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """-v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
+        """Return -v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
 
-        v = S_B T_B / 2. For clusters that are short for T_B the process is a random walk.
+        v is S_B T_B / 2. For clusters far shorter than T_B the process counts as a random walk.
         """
         if n * interval < _MAX_RATIO_FOR_WALK * self.T_B:
             return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
@@ -97,32 +97,32 @@ class GaussMarkov(base.Term):
         return -self._variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
 
     def state_space(self, interval: float) -> StateSpace:
-        """Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B)); it starts stationary."""
+        """Return a stationary model: Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B))."""
         drive = -self._variance * math.expm1(-2.0 * interval / self.T_B)
         return StateSpace.scalar(math.exp(-interval / self.T_B), drive, self._variance)
 
     def continuous_space(self) -> ContinuousSpace:
-        """F = -1/T_B, Q = S_B."""
+        """Return a model with F = -1/T_B and Q = S_B."""
         F, Q = np.array([[-1.0 / self.T_B]]), np.array([[self.density]])
         return ContinuousSpace(F, Q, np.ones(1))
 
     @property
     def drive(self) -> base.Drive:
-        """S_B through T_B."""
+        """A process of driving density S_B with the correlation time T_B."""
         return base.Drive(process=base.Process(self.T_B, self.density))
 
     @property
     def gauss_markov(self) -> "GaussMarkov":
-        """Itself."""
+        """The term itself."""
         return self
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """S_B (T_B^(2m+3) P_m(x) + c^2 T_B (P_0(y) / y^2 + (d_x - d_y)^2 / 2)).
+        """Return S_B (T_B^(2m+3) P_m(x) + c^2 T_B (P_0(y) / y^2 + (d_x - d_y)^2 / 2)).
 
-        x = t/T_B, y = W/T_B; with E_k(x) = x^k phi_k(-x) (`exponentials.phi`) P_m(x) is the
-        integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
-        d_y = y phi_2(-y) are the decay of the state at the start, forward and backward. Where
-        not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
+        x = t/T_B, y = W/T_B; with E_k(x) = x^k phi_k(-x) (`exponentials.evaluate_phi`) P_m(x) is
+        the integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
+        d_y = y phi_2(-y) are the decay of the state at the start, forward and backward.
+        Uncalibrated, it is S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
         x, constant = time / self.T_B, of_constant(order, time)
         driven = time ** (2 * order + 3) * integrate_squared_response(order, x)
@@ -137,9 +137,9 @@ class GaussMarkov(base.Term):
         return self.density * (driven + constant**2 * (in_window + self.T_B * lost**2 / 2.0))
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """S_B times the integral of h^2 from 0 to t.
+        """Return S_B times the integral of h^2 from 0 to t, for the first and second integral.
 
-        h = T_B (1 - e^(-s/T_B)) and h = T_B s - T_B^2 (1 - e^(-s/T_B)).
+        First: h = T_B (1 - e^(-s/T_B)). Second: h = T_B s - T_B^2 (1 - e^(-s/T_B)).
         """
         x = time / self.T_B
         first, second = np.zeros_like(x), np.zeros_like(x)
@@ -155,19 +155,19 @@ class GaussMarkov(base.Term):
         return self.density * self.T_B**3 * first, self.density * self.T_B**5 * second
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """V ((1 - e^-x) / x)^2 e^(-(k-1) x), and 2 v (x - 1 + e^-x) / x^2 at k = 0.
+        """Return v ((1 - e^-x) / x)^2 e^(-(k-1) x), and 2 v (x - 1 + e^-x) / x^2 at k = 0.
 
-        x = d / T_B, v = S_B T_B / 2.
+        Here x = d / T_B and v = S_B T_B / 2.
         """
         x = block / self.T_B
         apart = (math.expm1(-x) / x) ** 2 * np.exp(-(np.maximum(lags, 1.0) - 1.0) * x)
         return self._variance * np.where(lags == 0.0, 2.0 * (x + math.expm1(-x)) / x**2, apart)
 
     def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
-        """V s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B), v = S_B T_B / 2.
+        """Return v s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B).
 
-        The lag is from the last sample of one block to the first of the other; on the diagonal
-        v (n (1 + p) / (1 - p) - 2 p (1 - p^n) / (1 - p)^2) / n^2.
+        v is S_B T_B / 2. The lag is from the last sample of one block to the first of the other.
+        The diagonal is v (n (1 + p) / (1 - p) - 2 p (1 - p^n) / (1 - p)^2) / n^2.
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         x = 1.0 / (blocks.rate * self.T_B)
@@ -188,12 +188,12 @@ class GaussMarkov(base.Term):
         return covariance
 
     def reading(self, lowest_tau: float) -> base.Reading:
-        """0.664 B at the peak."""
+        """Return 0.664 B, the level at the peak, tau = 1.89 T_B."""
         return base.Reading(PEAK_TAU * self.T_B, FLOOR * self.B, "B", FLOOR, peak=True)
 
     @property
     def in_words(self) -> str:
-        """B and T_B."""
+        """The values of B, SI, and T_B, in words."""
         return f"Gauss-Markov process B = {self.B:.3e}, T_B = {self.T_B:.4g} s"
 
 
@@ -208,7 +208,7 @@ def compute_bias_instability(density: float, T_B: float) -> float:
 
 
 def evaluate_gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
-    """Return the Allan variance of a Gauss-Markov process over S_B, s.
+    """Return the Allan variance of a Gauss-Markov process divided by S_B, s.
 
     Maia et al., eq. 26; Farrell et al. 2022, eq. 63. Tau and T_B may be arrays that broadcast.
 
@@ -230,10 +230,10 @@ def evaluate_gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
 
 
 def evaluate_sampled_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
-    """Return the Allan variance of a sampled Gauss-Markov process over S_B, s.
+    """Return the Allan variance of a sampled Gauss-Markov process divided by S_B, s.
 
-    (T_B / (2 n^2)) (n (1+p)/(1-p) - p (3 - 4 p^n + p^(2n)) / (1-p)^2) with p = e^(-T/T_B);
-    from the sum of the covariances of the samples.
+    (T_B / (2 n^2)) (n (1+p)/(1-p) - p (3 - 4 p^n + p^(2n)) / (1-p)^2) with p = e^(-T/T_B), T the
+    interval and n samples per cluster; from the sum of the covariances of the samples.
     """
     n = np.asarray(n, dtype=np.float64)
     p = math.exp(-interval / T_B)

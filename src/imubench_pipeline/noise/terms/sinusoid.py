@@ -29,21 +29,21 @@ class Sinusoid(Deterministic):
     )
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
-        """0: the power amplitude^2 / 2 of a line has no density."""
+        """Return 0: the power amplitude^2 / 2 of a line has no density."""
         return np.zeros_like(frequency)
 
     def allan_variance(self, tau: Array) -> Array:
-        """amplitude^2 (sin^2(pi f_0 tau) / (pi f_0 tau))^2."""
+        """Return amplitude^2 (sin^2(pi f_0 tau) / (pi f_0 tau))^2."""
         x = np.pi * self.frequency * tau
         return self.amplitude**2 * (np.sin(x) ** 2 / x) ** 2
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """amplitude^2 sin^4(n x) / (n sin(x))^2 with x = pi f_0 T."""
+        """Return amplitude^2 sin^4(n x) / (n sin(x))^2 with x = pi f_0 T."""
         x = math.pi * self.frequency * interval
         return self.amplitude**2 * np.sin(n * x) ** 4 / (n * math.sin(x)) ** 2
 
     def state_space(self, interval: float) -> StateSpace:
-        """Rotate by 2 pi f_0 T a sample; the phase at the start is not known."""
+        """Return a rotation by 2 pi f_0 T per sample; the initial phase is not known."""
         angle = 2.0 * math.pi * self.frequency * interval
         cosine, sine = math.cos(angle), math.sin(angle)
         return StateSpace(
@@ -56,20 +56,20 @@ class Sinusoid(Deterministic):
         )
 
     def continuous_space(self) -> ContinuousSpace:
-        """Turn at 2 pi f_0."""
+        """Return a rotation at 2 pi f_0, rad/s."""
         speed = 2.0 * math.pi * self.frequency
         F = np.array([[0.0, speed], [-speed, 0.0]])
         return ContinuousSpace(F, np.zeros((2, 2)), np.array([1.0, 0.0]))
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
-        """Draw the phase; the amplitude is given."""
+        """Draw the initial state: a random phase, with the amplitude of the line."""
         phase = rng.uniform(0.0, 2.0 * math.pi)
         return self.amplitude * np.array([math.cos(phase), math.sin(phase)])
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with w = 2 pi f_0.
+        """Return A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with w = 2 pi f_0.
 
-        The phase is random; without the last where not calibrated.
+        A is the amplitude; the phase is random. Uncalibrated, phi_1(-i w W) is absent.
         """
         omega = 2.0 * math.pi * self.frequency
         constant, x = of_constant(order, time), omega * time
@@ -86,9 +86,9 @@ class Sinusoid(Deterministic):
         return 0.5 * (self.amplitude * gain) ** 2
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
-        """A^2 / 2 times the gains of both blocks and the cosine of their phase difference.
+        """Return A^2 / 2 times the gains of both blocks and the cosine of their phase difference.
 
-        A gain is sin(n w T/2) / (n sin(w T/2)); the phase at the start is not known.
+        A is the amplitude, w = 2 pi f_0, and a gain sin(n w T/2) / (n sin(w T/2)).
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         half = math.pi * self.frequency * (1.0 / blocks.rate)
@@ -98,7 +98,7 @@ class Sinusoid(Deterministic):
         return np.asarray(0.5 * self.amplitude**2 * np.outer(gain, gain) * turns)
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw the phase."""
+        """Return the sums for a random phase."""
         half = math.pi * self.frequency * (1.0 / rate)
         gain = self.amplitude * math.sin(width * half) / math.sin(half)
         phase = rng.uniform(0.0, 2.0 * math.pi)
@@ -106,7 +106,7 @@ class Sinusoid(Deterministic):
         return gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
 
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return half the square of the remaining amplitude, at a random phase."""
+        """Return half the squared amplitude of the weighted sum, and the frequency of the line."""
         turn = 2.0 * math.pi * self.frequency * block
         middle = np.arange(len(weights)) + 0.5
         seen = np.sinc(self.frequency * block) * (weights @ np.exp(1j * turn * middle))
@@ -114,5 +114,5 @@ class Sinusoid(Deterministic):
 
     @property
     def in_words(self) -> str:
-        """Amplitude and frequency."""
+        """Amplitude, SI, and frequency, in words."""
         return f"line of amplitude {self.amplitude:.3e} at {self.frequency:.6g} Hz"

@@ -57,7 +57,7 @@ _MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 
 
 class Analysis:
-    """The steps of all recordings of a plan, in parallel: first the estimates, then the rest."""
+    """Runs the steps for all recordings of a plan, in parallel; ``say`` prints a progress line."""
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
         self._plan, self._compiling, self._cores, self._say = plan, compiling, cores, say
@@ -66,7 +66,7 @@ class Analysis:
         self._series: list[tuple[str, str, str]] = []
 
     def estimates(self) -> dict[str, pa.Table]:
-        """Read the logs and estimate; return all joined tables so far."""
+        """Read the logs and estimate; return tables by name, empty where `for_pages` fills them."""
         self._compiling.expected()
         with ThreadPoolExecutor(self._cores) as beside:
             channels = _collect_results(
@@ -79,7 +79,7 @@ class Analysis:
         return self._join_tables(_ESTIMATE_TABLES)
 
     def for_pages(self) -> dict[str, pa.Table]:
-        """Compute the further results for pages, after the estimates; return all joined tables."""
+        """Compute the results that only pages need, after `estimates`; return tables by name."""
         with ThreadPoolExecutor(self._cores) as beside:
             compared = self._submit(beside, "datasheet", self._plan.recordings, self._compare)
             parts = _collect_results(

@@ -30,7 +30,7 @@ _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and b
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.description = (
         "Read static logs, report their faults, and estimate the noise parameters of each axis, "
         "like a run of the workflow."
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the logs of a command, and how they are read and analysed."""
+    """Add the arguments for the logs of a command, and for how these are read and analysed."""
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
     )
@@ -134,9 +134,9 @@ def _run(arguments: argparse.Namespace, compiling: "Compilation") -> int:
 
 
 def plan_logs(arguments: argparse.Namespace, folder: Path, device: str | None = None) -> "Plan":
-    """Return the plan of a temporary project of logs in a folder.
+    """Make a temporary project of the logs of a command in a folder; return its plan.
 
-    ``device``: the name of the sensor of all logs; None: a sensor for each log. Raises CommandError
+    ``device``: name of the one sensor of all logs; None: a sensor for each log. Raises CommandError
     if a log or a setting cannot be used.
     """
     from imubench_pipeline.run.analysis.project import lay_out
@@ -160,7 +160,7 @@ def plan_logs(arguments: argparse.Namespace, folder: Path, device: str | None = 
 
 
 def read_stated(arguments: argparse.Namespace) -> "Stated":
-    """Return what the arguments state of logs."""
+    """Return the properties of logs that the arguments state: rate, units and topics."""
     from imubench_pipeline.run.analysis.project import Stated
 
     units = arguments.gyro_unit, arguments.accel_unit

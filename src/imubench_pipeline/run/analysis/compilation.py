@@ -28,7 +28,7 @@ _PARTS = (compile_kernels, _compile_curve_kernels)
 
 
 class Compilation(AbstractContextManager["Compilation"]):
-    """Compiles the kernels of estimates unless cached; at the end it ends its processes."""
+    """Compiles the kernels of estimates, unless cached, in processes that end with the context."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -37,12 +37,12 @@ class Compilation(AbstractContextManager["Compilation"]):
         self._finished = False
 
     def expected(self) -> None:
-        """Start the timer of the message: the caller will wait for the compilation."""
+        """Start the timer of the progress message; call it before waiting for the compilation."""
         if not self._finished:
             self._timer.start()
 
     def finish(self) -> None:
-        """Wait for the end, and load the kernels, so that forks need not load them."""
+        """Wait for the compilation, and load the kernels, so that forks need not load them."""
         if self._finished:
             return
         for process in self._processes:

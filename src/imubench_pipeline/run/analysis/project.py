@@ -22,7 +22,7 @@ INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # for the inspection of a log, s a
 
 @dataclass(frozen=True)
 class Stated:
-    """Properties of logs from the command line, where the logs do not state them."""
+    """Properties of logs that the command line states, where the logs do not."""
 
     rate: str | None = None
     gyro_unit: str | None = None
@@ -30,7 +30,7 @@ class Stated:
     topics: tuple[str, ...] = ()  # of a bag; empty: all
 
     def unit_of(self, channel: str) -> str | None:
-        """Return the unit that is stated for a channel."""
+        """Return the unit that is stated for a channel; None: the log must state it."""
         return self.gyro_unit if quantity_of(channel) == "gyro" else self.accel_unit
 
     def __bool__(self) -> bool:
@@ -53,20 +53,20 @@ def lay_out(
 
     `logs`: files, or folders of recordings. `sensor`: the sensor file of all logs, or its name in
     the folders `catalogue`; None: a draft for each log, as by `imubench inspect`, completed by
-    `stated`. `device`: all logs are of this one, and drafted from the first.
+    `stated`. `device`: one sensor for all logs, drafted from the first; None: one for each log.
     Return the paths in the configuration of the run.
 
-    Raise a ConfigError if a log is missing, two logs would have one name, the sensor file cannot be
+    Raise a ConfigError if a log is missing, two logs have the same name, the sensor file cannot be
     used, or a log does not state a required property (`UnfilledError`).
     """
     missing = [log for log in logs if not log.exists()]
     if missing:
-        raise ConfigError(f"{missing[0]}: no such file; expected a log, or the folder of one")
+        raise ConfigError(f"{missing[0]}: no such file; expected a log file or a folder of one log")
     declared = None if sensor is None else _find_sensor_file(sensor, catalogue)
     if declared is not None and stated:
         raise ConfigError(
-            "--rate, --gyro-unit, --accel-unit and --topic complete the statements of a log; they "
-            "cannot be used with --sensor: state them in the sensor file"
+            "--rate, --gyro-unit, --accel-unit and --topic cannot be used with --sensor; write the "
+            "rate, the units and the topic into the sensor file"
         )
     (folder / "sensors").mkdir()
     for log, name in zip(logs, _name_recordings(logs), strict=True):
@@ -103,8 +103,8 @@ def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
         if named is None:
             places = " or ".join(map(str, catalogue))
             raise ConfigError(
-                f"{sensor}: no such sensor file, and none of that name in {places}; expected "
-                "one, such as imubench inspect LOG --output FILE drafts"
+                f"{sensor}: no such sensor file, and no sensor of this name in {places}; correct "
+                "the name, or draft a sensor file with imubench inspect LOG --output FILE"
             )
         sensor = named
     read_settings(Sensor, sensor)
@@ -123,8 +123,8 @@ def _name_recordings(logs: Sequence[Path]) -> list[str]:
         if count > 1:
             alike = [str(log) for log, other in zip(logs, longer, strict=True) if other == name]
             raise ConfigError(
-                f"{' and '.join(alike)} would have one name, {name}; expected each log once, "
-                "under a name of its own"
+                f"{' and '.join(alike)} would have the same name, {name}; give each log once, "
+                "and rename one of two different logs"
             )
     return longer
 
@@ -141,8 +141,8 @@ def draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
         stated_by_log = unit not in (None, UNKNOWN) and not entry.comment.startswith("guessed")
         if stated_by_log and not _is_same_unit(str(unit), str(own), channel):
             raise ConfigError(
-                f"{log}: {channel} is in {unit}, as the log says, and not in {own}: leave the "
-                "option out, or write a sensor file if the log is wrong"
+                f"{log}: the log states {unit} for {channel}, but the option states {own}; omit "
+                "the option, or write a sensor file if the log is wrong"
             )
     if stated.rate and draft.time is None:
         draft.rate = Entry(stated.rate)
@@ -181,16 +181,16 @@ def _is_same_unit(unit: str, other: str, channel: str) -> bool:
 
 
 def inspect_log(log: Path, topics: Sequence[str] = (), model: str | None = None) -> Inspection:
-    """Return what a log holds, within bounds of time and memory; ConfigError if it cannot be read.
+    """List the content of a log and draft its sensor file, within limits of time and memory.
 
-    ``topics`` of a bag; none: all. ``model``: name of the sensor; None: the name of the log.
+    ``topics``: of a bag; empty: all. ``model``: sensor name; None: log name. May raise ConfigError.
     """
     try:
         return run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log, model, topics)
     except BoundError as error:
         raise ConfigError(
-            f"{log.name}: to list it {error}; expected the log of an inertial sensor: copy what it "
-            "measured into a file of its own"
+            f"{log.name}: the inspection {error}; expected a log of an inertial sensor: copy the "
+            "inertial samples into a separate file"
         ) from None
     except (RecordingError, OSError) as error:
         raise ConfigError(str(error)) from None

@@ -8,7 +8,7 @@ from imubench_pipeline.settings.command_line import CommandError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
+    """Add the arguments of the command to its parser."""
     parser.description = (
         "Read all outputs of runs, and compare them with their stored digests. Each line states "
         "the fault of a file, and the command that makes it again."
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the faults; return the exit status."""
+    """Print the files of the results that are not as a run left them; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
     from imubench_pipeline.report.run_summary import describe_drop_zone
     from imubench_pipeline.run.verification.results import Results

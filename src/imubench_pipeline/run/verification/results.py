@@ -34,7 +34,7 @@ class Fault:
 
 @dataclass
 class Results:
-    """Files in a folder of results; `read` is called with the number of bytes read."""
+    """Verifies the files in a folder of results; `read` is called with the number of bytes read."""
 
     folder: Path
     read: Callable[[int], None] = lambda _: None
@@ -63,7 +63,7 @@ class Results:
 
     @cached_property
     def run_again(self) -> str:
-        """The command of the run, as far as the report states it."""
+        """The command that runs the workflow again, with the settings that the report states."""
         config: list[str] = []
         try:
             settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))
@@ -76,7 +76,7 @@ class Results:
         return shlex.join([*called, *flags])
 
     def faults(self) -> Iterator[Fault]:
-        """Yield the changed files, each once."""
+        """Yield the files that are changed, missing or unexpected, each once."""
         named = set()
         for fault in self._every():
             if fault.path not in named:
@@ -109,13 +109,13 @@ class Results:
             try:
                 read_sealed_json(path)
             except (OSError, ValueError) as error:
-                yield Fault(name, f"expected what a run wrote, {_of(error)}", self._removed(name))
+                yield Fault(name, f"expected the file of a run, {_of(error)}", self._removed(name))
         for place in self._current:  # made from other inputs that are not newer
             others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
             if others:
                 first = next(iter(self.seals[place].outputs), sealing.name_seal_file(place))
                 words = (
-                    f"expected it made of the {others[0]} that is there, found it made of another"
+                    f"expected a file made from the present {others[0]}, found one of another input"
                 )
                 yield self._fault(first, words, place)
         yield from self._unsealed()
@@ -233,5 +233,5 @@ class Results:
 
 def _of(error: Exception) -> str:
     if isinstance(error, OSError):
-        return f"found what cannot be read ({error.strerror})"
-    return "found other letters"
+        return f"found a file that cannot be read ({error.strerror})"
+    return "found other content"

@@ -29,14 +29,14 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class TriadRuns:
-    """Simulated runs of one design, and their truth."""
+    """Simulated block means of triads at rest, with the true errors of each axis."""
 
     means: Array  # shape (runs, b, 6); block means of gyros and accelerometers, SI
     drift: Array  # shape (runs, b, 6); their slow errors, biases included
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return the readings of an error-free triad at an attitude, shape (3, 3), as (b, 6)."""
+    """Return error-free readings in each block, shape (b, 6), for an attitude, shape (3, 3)."""
     to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
     return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
 
@@ -50,7 +50,7 @@ def simulate_triad(
     runs: int,
     rng: np.random.Generator,
 ) -> TriadRuns:
-    """Draw the block means of many runs, from the attitude in the first position, (3, 3)."""
+    """Draw the block means of many runs; ``attitude``, shape (3, 3), is of the first position."""
     drawn = [
         simulate_runs(
             model, positions.blocks, earth_rate=0.0, turn_on_bias=bias, runs=runs, rng=stream
@@ -72,7 +72,7 @@ _LEVEL_ATTITUDE = np.eye(3)
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Uncertainty of the attitude after a time."""
+    """Accuracy of the alignment of a triad after a time at rest."""
 
     positions: int  # 1 or 2
     method: str  # ``coarse`` or ``fine``
@@ -110,7 +110,7 @@ def accuracies(
     runs: int = 0,
     rng: np.random.Generator | None = None,
 ) -> Iterator[Accuracy]:
-    """Yield the accuracy after times, s, at a rate, Hz, simulated in ``runs`` at the last time."""
+    """Yield the accuracy after times, s; a simulation of ``runs`` triads checks the last time."""
     for number in (1, 2):
         for time in times:
             block = time / _BLOCKS_BY_POSITIONS[number]

@@ -44,7 +44,7 @@ def euler_angles(attitude: Array) -> Array:
 
 
 def cross_matrix(vector: ArrayLike) -> Array:
-    """Return [v x], shape (..., 3, 3), so that [v x] u is v x u, of v of shape (..., 3)."""
+    """Return [v x], shape (..., 3, 3), for v, shape (..., 3), so that [v x] u is v x u."""
     v = np.asarray(vector, dtype=np.float64)
     cross = np.zeros((*v.shape, 3))
     cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]

@@ -43,9 +43,9 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
 
 
 def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return standard deviations of coarse alignment about a true attitude, shape (3, 3).
+    """Return the standard deviations of roll, pitch and heading by coarse alignment, rad, (3,).
 
-    They are of roll, pitch and heading, rad, shape (3,).
+    ``attitude``, shape (3, 3), is the true attitude.
     """
     weighted = _weigh_blocks(positions)
     of_sensor = []

@@ -37,7 +37,7 @@ _MAX_ITERATIONS = 20
 
 @dataclass(frozen=True)
 class Aligned:
-    """Attitudes of runs of one design."""
+    """Attitudes from fine alignment, one for each run, with the estimated errors of the axes."""
 
     attitude: Array  # shape (runs, 3, 3); body to navigation, first position, all the data
     psi: Array  # shape (runs, b, 3); estimated error of the given attitude, rad
@@ -46,7 +46,7 @@ class Aligned:
 
 
 class FineAlignment:
-    """The filter of one design for any number of runs, about an attitude, shape (3, 3)."""
+    """A filter that aligns runs with equal blocks, linear about an attitude, shape (3, 3)."""
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
         self.positions, self.site, self.attitude = positions, site, attitude
@@ -136,6 +136,6 @@ def align(
         if step < _MAX_LAST_CORRECTION:
             return aligned, fine
     raise ValueError(
-        f"the attitude does not settle; its last correction was {step:.2g} rad, the heading's "
-        f"standard deviation {fine.sigma[-1, 2]:.2g} rad"
+        f"the attitude does not converge; the last correction was {step:.2g} rad, the standard "
+        f"deviation of the heading is {fine.sigma[-1, 2]:.2g} rad"
     )

@@ -17,7 +17,7 @@ _NEAREST_POLE = 1e-6  # least cosine of the latitude; nearer to a pole there is 
 
 @dataclass(frozen=True, kw_only=True)
 class Site:
-    """A place between the poles (else ValueError), with rate and force of a triad at rest."""
+    """A place on Earth; ValueError at a pole, or if a value is out of range."""
 
     latitude: float  # rad, north positive
     gravity: float = STANDARD_GRAVITY  # m/s^2
@@ -43,7 +43,7 @@ class Site:
 
 @dataclass(frozen=True, kw_only=True)
 class Triad:
-    """Three gyros and accelerometers along x, y, z; ValueError if not, or for a wrong deviation."""
+    """Noise of three gyros and three accelerometers, x, y, z; ValueError if out of range."""
 
     gyros: Sequence[NoiseModel]  # three, SI
     accelerometers: Sequence[NoiseModel]  # three, SI
@@ -53,7 +53,7 @@ class Triad:
     def __post_init__(self) -> None:
         for name in ("gyros", "accelerometers"):
             if len(getattr(self, name)) != 3:
-                raise ValueError(f"{len(getattr(self, name))} {name}, expected three")
+                raise ValueError(f"found {len(getattr(self, name))} {name}, expected three")
         for name in ("gyro_bias", "accelerometer_bias"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
@@ -82,7 +82,7 @@ class Positions:
         if not (
             np.allclose(square, np.eye(3), atol=1e-6) and np.all(np.linalg.det(self.turned) > 0)
         ):
-            raise ValueError("turned contains a matrix that is not a rotation")
+            raise ValueError("turned has a matrix that is not a rotation, expected C C^T = I")
 
     @classmethod
     def at_rest(cls, duration: float, block: float, rate: float) -> "Positions":
@@ -105,5 +105,5 @@ class Positions:
 
     @property
     def of_blocks(self) -> Array:
-        """The matrix of each block, shape (b, 3, 3)."""
+        """Rotation from the body frame of each block to the first, shape (b, 3, 3)."""
         return np.asarray(self.turned[self.blocks.dwell])

@@ -1,4 +1,4 @@
-"""Write what filters and simulators load, for every sensor."""
+"""Write the input files of filters and simulators, for every sensor."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Show samples of a log beside those of the models that were found of it."""
+"""Simulate samples of the estimated models of a log, to compare with samples of the log."""
 
 from pathlib import Path
 
