@@ -120,7 +120,7 @@ def test_models_are_written_without_a_log(tmp_path: Path) -> None:
     assert read(text)["accelerometer_random_walk"] == pytest.approx(ACCEL.K)
     with pytest.raises(ValueError, match="there are: kalibr"):
         imu.export({"gyro": GYRO, "accel": ACCEL}, "colmap", rate=200.0)
-    with pytest.raises(ValueError, match="expected gyro and accel"):
+    with pytest.raises(ValueError, match="expected only 'gyro' and 'accel'"):
         imu.export({"gyro_x": GYRO}, "kalibr", rate=200.0)
 
 
