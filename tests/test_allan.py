@@ -197,7 +197,7 @@ def test_only_taus_with_a_difference_are_returned() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"samples": []}, "2 or more"),
+        ({"samples": []}, "size >= 2"),
         ({"samples": [[1.0, 2.0]]}, "one dimension"),
         ({"rate": 0.0}, "frequency above 0"),
         ({"cluster_sizes": [0]}, "whole numbers of 1 or more"),

@@ -35,7 +35,7 @@ def test_a_state_space_has_the_bank_in_it() -> None:
 
 
 def test_an_empty_band_is_refused() -> None:
-    with pytest.raises(ValueError, match="empty"):
+    with pytest.raises(ValueError, match="expected 0 < interval < longest"):
         fit_flicker_bank(1.0, 10.0, 10.0)
 
 

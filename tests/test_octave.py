@@ -151,7 +151,7 @@ def test_tau_is_that_of_the_size_really_used(rng: np.random.Generator) -> None:
 
 
 def test_wrong_blocks() -> None:
-    with pytest.raises(ValueError, match="hold 5 samples"):
+    with pytest.raises(ValueError, match="have 5 samples"):
         of_blocks([np.zeros(5)], 10, 1.0, holes=False)
     with pytest.raises(ValueError, match="end before sample 100000"):
         of_blocks([np.zeros(5)], 100_000, 1.0, holes=False)

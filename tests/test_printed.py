@@ -78,7 +78,7 @@ def test_every_key_has_a_dimension() -> None:
         ("noise_density", {"value": -1}, r"gyro\.noise_density: value -1\.0; expected .* above 0"),
         ("noise_density", {"unit": None}, r"gyro\.noise_density: 'unit' is missing; expected"),
         ("noise_density", {"unit": "deg/h"}, r"density\.unit: 'deg/h' is no unit of gyro density"),
-        ("noise_density", {"unit": "mdps/ Hz"}, r"root lost, and 'mdps/sqrt\(Hz\)' meant"),
+        ("noise_density", {"unit": "mdps/ Hz"}, r"root was lost, write 'mdps/sqrt\(Hz\)'"),
         ("noise_density", {"kind": "mean"}, r"gyro\.noise_density\.kind: found 'mean'; input"),
         ("noise_density", {"side": "one"}, r"noise_density\.side: unknown key; did you mean 'sid"),
         (

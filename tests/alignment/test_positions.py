@@ -82,7 +82,7 @@ def test_the_attitude_is_found_within_what_is_said_of_it(tmp_path: Path) -> None
         row = rows[name]
         assert row["status"] == "ok" and abs(row["value"] - value) < 3.5 * row["sigma"], name
         assert row["lower"] < row["value"] < row["upper"]
-    assert rows["heading"]["rates"] == 60 and "not measured" in rows["heading"]["model_from"]
+    assert rows["heading"]["rates"] == 60 and "typical figures" in rows["heading"]["model_from"]
     # N / sqrt(T) over the horizontal part of the Earth's rate, and what flickers beside it.
     least = 0.0122 * DEGREE / math.sqrt(60 * 38.0) / (EARTH * math.cos(50 * DEGREE))
     assert least < rows["heading"]["sigma"] < 1.5 * least

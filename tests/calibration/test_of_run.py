@@ -141,7 +141,7 @@ def test_without_any_noise_nothing_is_estimated(tmp_path: Path) -> None:
     rows = run(folder, [], rate_table={"steps": STEPS})["calibration"]
     assert {row["status"] for row in rows} == {"no_model"}
     printed = run(folder, [], SENSOR | {"datasheet": PRINTED}, rate_table={"steps": STEPS})
-    assert "typical figures of" in printed["calibration"][0]["model_from"]
+    assert "typical figures (" in printed["calibration"][0]["model_from"]
 
 
 def test_two_rates_have_no_straightness(tmp_path: Path, rest: list[Path]) -> None:

@@ -66,7 +66,7 @@ def test_the_rate_is_found_within_what_is_said_of_it(found: Found) -> None:
     assert rows["filter"]["model_from"] == "static recording night; method likelihood"
     given = rows["known_rate"]
     assert (given["status"], given["sigma"]) == ("given", None)
-    assert "whatever rate" in "; ".join(given["reasons"])
+    assert "it is no estimate" in "; ".join(given["reasons"])
     last = by_method(found["earth_rate"], "last 5 min")["pairs"]
     assert last["dwells"] == 10
     assert last["sigma"] == pytest.approx(rows["pairs"]["sigma"] * math.sqrt(2), rel=0.05)
@@ -262,9 +262,7 @@ def test_the_datasheet_answers_where_no_static_recording_does(tmp_path: Path) ->
     found = briefly(put(tmp_path / "a", turned_log()), [], sensor=sensor)
     row = by_method(found["earth_rate"])["filter"]
     assert row["status"] == "ok" and row["model"] == "N"
-    assert row["model_from"].startswith(
-        "typical figures of the datasheet of s: sheet 1, not measured"
-    )
+    assert row["model_from"].startswith("typical figures (the datasheet of s: sheet 1)")
     assert by_method(found["earth_rate"])["known_rate"]["status"] == "given"
 
 
@@ -290,7 +288,7 @@ def test_the_device_itself_answers_before_others_and_long_logs_before_short(
     assert chosen(other, short, long, made, bad, accel)[0] == 3e-4
     assert chosen(other, made) == (
         1e-4,
-        "static recording other, of another device, 8; method likelihood",
+        "static recording other, of another specimen, 8; method likelihood",
     )
     assert chosen(made)[1] == "static recording sim_x, simulated; method likelihood"
     assert "of its gyro y, as gyro x has no estimate there" in chosen(axis, bad)[1]

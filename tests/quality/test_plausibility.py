@@ -101,7 +101,7 @@ def test_units_of_angle_that_are_mixed_up_are_named(
         (finding,) = said
         assert (finding.finding, finding.channel) == ("suspicious_unit", "gyro_z")
         assert finding.value == pytest.approx(1 / factor)
-        assert f"If the log is in {meant}, and not {stated}, it is 0.004" in finding.detail
+        assert f"If the log is in {meant}, and not {stated}, this is 0.004" in finding.detail
         # 0.0048 °/s/√Hz, roughly
 
 
@@ -158,7 +158,7 @@ def test_gravity_names_the_unit_of_acceleration(
     for finding in said:
         assert finding.finding == "suspicious_unit"
         assert finding.value == pytest.approx(1 / factor)
-        assert f"If the log is in {meant}, and not {stated}, it is 10.3 m/s²" in finding.detail
+        assert f"If the log is in {meant}, and not {stated}, this is 10.3 m/s²" in finding.detail
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_one_accelerometer_is_judged_by_its_noise(rng: np.random.Generator) -> N
     log = triad(rng, DOWN)["accel_x"]
     assert found({"accel_x": log}, SI, sensor) == []
     (finding,) = found({"accel_x": 1000 * log}, {"accel": "g"}, sensor)
-    assert "If the log is in mg, and not g, it is 89.3 µg/√Hz" in finding.detail
+    assert "If the log is in mg, and not g, this is 89.3 µg/√Hz" in finding.detail
     assert found({"accel_x": 1000 * log}, {"accel": "g"}) == []  # nothing is known of it
 
 
@@ -341,7 +341,7 @@ def test_stated_rate_is_checked_against_the_datasheet_noise(
     log = {"gyro_x": math.sqrt(times) * gyro(rng, 1e-3)}  # N as of another rate
     assert found(log, sensor=sensor) == []
     both = log | {"gyro_y": log["gyro_x"]}
-    names = [(one.finding, one.channel, "the stated rate of 100 Hz" in one.detail)
+    names = [(one.finding, one.channel, "the sampling rate (100 Hz is stated)" in one.detail)
              for one in found(both, sensor=sensor, timed=False)]  # fmt: skip
     # The rate is that of all channels.
     assert names == [("noise_unlike_datasheet", None, True)] * said

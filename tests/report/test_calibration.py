@@ -58,7 +58,7 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
 def test_the_page_of_a_rate_table(read: dict[str, Read]) -> None:
     page = read["recordings/s/table.html"]
     assert "The scale factor error is" in page.text and "Noise explains" in page.text
-    assert "Allan variance, estimates and ranking do not use it" in page.text
+    assert "it is not used for the Allan variance, noise parameters or ranking" in page.text
     assert "6 constant rates up to 50 °/s" in page.text
     assert "10.64 °/h (latitude 45°, elevation 90°), is subtracted" in page.text
     kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}

@@ -94,8 +94,8 @@ def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
     page = read["recordings/s/run.html"]
     assert "The filter estimates an Earth's rate of" in page.text
     assert "19 turns between north and south, at latitude 0°" in page.text
-    assert "Allan variance, estimates and ranking do not use it" in page.text
-    assert "so it cannot estimate the rate" in page.text
+    assert "it is not used for the Allan variance, noise parameters or ranking" in page.text
+    assert "this is no estimate" in page.text
     kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}
     assert kinds == {"dwells", "earth_rate", "bound"}  # of samples none are kept here
     parts = [one.attributes.get("data-part") for one in page.elements

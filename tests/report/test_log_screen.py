@@ -61,7 +61,9 @@ def test_findings_of_one_kind_are_one_event_and_fatal_ones_are_first() -> None:
     stuck = finding("stuck", "gyro_x", severity="fatal", affects=())
     events = group_events([*rows, stuck])
     assert [len(event.findings) for event in events] == [1, 6]
-    assert events_text(events[1].findings).startswith("Gyro x, y and z and accel x, y and z. ")
+    assert events_text(events[1].findings).startswith(
+        "Gyro x, y and z and accel x, y and z, for example: "
+    )
 
 
 @pytest.mark.parametrize("width", [80, 120])

@@ -322,7 +322,7 @@ def test_a_warning_that_is_shown_on_purpose_says_so(report: Report) -> None:
     shown = {view.warnings[0]["finding"]: "A mistake that is often made."}
     settings = {**made.settings, "on_purpose": {f"{view.sensor}/{view.name}": shown}}
     told = START.context(replace(made, settings=settings))
-    assert told["in_doubt"].endswith("in doubt, all simulated to show it")
+    assert told["in_doubt"].endswith("in doubt, all simulated with these faults")
     assert told["warned"][0]["on_purpose"] == ["A mistake that is often made."]
     assert START.context(made)["warned"][0]["on_purpose"] == []
 
@@ -334,7 +334,7 @@ def test_what_is_taken_out_of_the_noise_stands_on_the_page_of_its_recording(
     steps = page.naming("400± 2", "tr")
     assert all("bias step" in row.text for row in steps)
     assert "25 to 35" in steps[0].text
-    assert all("warm up drift" in row.text for row in page.naming("613500 to 700", "tr"))
+    assert all("warm-up drift" in row.text for row in page.naming("613500 to 700", "tr"))
 
 
 def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:

@@ -204,10 +204,10 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
         "2 analysed, 1 rejected. 1 of them is simulated, not measured."
     )
     assert summarise_recordings(views[1:2], several=False) == (
-        "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed, 0 rejected. "
+        "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed. "
         "It is simulated, not measured."
     )
-    assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
+    assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed."
 
 
 def test_recompute_command_includes_the_settings_of_the_run() -> None:

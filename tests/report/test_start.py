@@ -15,8 +15,7 @@ from tests.report.tables import ROBOT
 
 NAMES = {name: name.upper() for name in "abc"}
 LIMIT = (
-    "Deciding limit: heading, 100 s. Expected error 0.29 ° (0.23 to 0.34), "
-    "allowed 0.573 ° (the limit as 1σ)."
+    "Deciding limit: heading, 100 s. Expected error (1σ) 0.29 ° (0.23 to 0.34), allowed 0.573 °."
 )
 DATA = "Data: one recording, r (2 h, 1 axis); other specimens may differ."
 
@@ -69,7 +68,7 @@ def test_a_simulated_best_sensor_is_called_so() -> None:
 
 def test_what_the_decisive_figure_leaves_out_is_said() -> None:
     _, lines = said(row(reasons=["K of gyro_x is not identified"]))
-    assert lines == [f"{LIMIT} Not counted: K of gyro_x is not identified. {DATA}"]
+    assert lines == [f"{LIMIT} The error may be larger: K of gyro_x is not identified. {DATA}"]
 
 
 def test_sensors_that_are_not_worse_are_named() -> None:
@@ -104,7 +103,7 @@ def test_a_verdict_that_a_corrected_unit_changes_is_said() -> None:
     )  # fmt: skip
     assert lines[1:] == [
         "Not enough data: B (no data).",
-        "B fails (margin 0.1) as logged; "
+        "With its recording in doubt, B fails (margin 0.1) as logged; "
         "meets the limits (margin 7) with the gyro data read as °/s, not as rad/s.",
     ]
 
@@ -129,8 +128,8 @@ def test_where_no_sensor_can_be_ranked_none_is_the_best() -> None:
         (
             {"recordings": 3, "specimens": 2, "spread": 0.1, "spread_of": "specimens",
              "doubts": (DoubtMark("q", "motion"),)},
-            "Data: 3 recordings of 2 units; r (2 h, 1 axis) is nearest to the prediction. "
-            "Spread: 10 % between units. Doubts: q: the sensor was moved.",
+            "Data: 3 recordings of 2 specimens; r (2 h, 1 axis) is nearest to the prediction. "
+            "Spread: 10 % between specimens. Doubts: q: the sensor was moved.",
         ),
     ],
 )  # fmt: skip

@@ -106,7 +106,7 @@ def test_a_sensor_without_a_quantity_lacks_its_axes() -> None:
         {"axes": ["accel_xyz"], "full_scale": {"accel": "2 g"}},
         datasheet={"gyro": FIGURES, "accel": None},
     )
-    assert (lacking, unknown) == (["no accelerometer"], [])
+    assert (lacking, unknown) == (["the sensor has no accelerometer"], [])
 
 
 def test_the_highest_rate_is_that_of_the_sensor() -> None:
@@ -134,5 +134,5 @@ def test_a_sensor_without_a_needed_quantity_lacks_it() -> None:
     without = WHOLE | {"datasheet": {"gyro": FIGURES, "accel": None}}
     has = read_abilities(Sensor.model_validate(without))
     (lacking,), unknown = judge(Requirement.model_validate(position), has)
-    assert shortfall_text(lacking) == "no accelerometer" and not unknown
+    assert shortfall_text(lacking) == "the sensor has no accelerometer" and not unknown
     assert judge(Requirement.model_validate(HEADING), has) == ([], [])

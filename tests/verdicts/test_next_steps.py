@@ -32,7 +32,7 @@ def test_what_turns_most_verdicts_comes_first() -> None:
     assert all(row["verdicts_turned"] == 0 for row in others)
     (more,) = (row for row in others if row["sensor"] == "fine")
     assert (more["action"], more["specimens"], more["recording"]) == ("add_specimens", 2, None)
-    assert more["text"] == ("Record 2 more units: this would give 2 verdicts stronger evidence")
+    assert more["text"] == ("Record 2 more specimens: this would give 2 verdicts stronger evidence")
 
 
 @pytest.mark.parametrize("margin", [1.2, 1 / 1.2])

@@ -38,7 +38,10 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     ),
     (
         SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL),
-        ["noise is 0.241 °/s/√Hz; expected 0.0005 to 0.06 for a MEMS gyro", "it is 0.0042 °/s/√Hz"],
+        [
+            "noise is 0.241 °/s/√Hz; expected 0.0005 to 0.06 for a MEMS gyro",
+            "this is 0.0042 °/s/√Hz",
+        ],
     ),
     (
         SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL, printed=True),
@@ -46,7 +49,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     ),
     (
         SuspiciousUnit("g", "m/s^2", 1.0 / 9.80665, gravity=96.17),
-        ["mean acceleration is 96.17 m/s²; expected 9.807", "it is 9.807 m/s²", "correct 'unit'"],
+        ["mean acceleration is 96.17 m/s²; expected 9.807", "this is 9.807 m/s²", "correct 'unit'"],
     ),
     (SlowSampling(1.0), ["sampled at 1 Hz", "folded into N"]),
     (ImpossibleNoise(1e-11, 4e-4, 22), ["5.73×10⁻¹⁰ °/s/√Hz, 4×10⁷ times below", "dead"]),
@@ -58,18 +61,21 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     ),
     (
         NoiseUnlikeDatasheet("gyro_x", 0.05 * DEG, 0.004 * DEG, 100.0),
-        ["Check the stated rate of 100 Hz, scale"],
+        ["Check the sampling rate (100 Hz is stated), scale"],
     ),
     (
         AxisUnlike(("gyro_x", "gyro_y"), 57.3, 0.3 * DEG, "deg/s", "rad/s"),
         ["57.3 times that of gyro x and gyro y: 0.3 °/s/√Hz", "rad/s instead of deg/s"],
     ),
     (AxisUnlike(("gyro_x", "gyro_y"), 6.0, 0.3 * DEG, "deg/s", None), ["differ so much. Check"]),
-    (Turning(-31.0 * DEG, largest=30.0 * DEG), ["is −31 °/s, above", "of any gyro (30 °/s)"]),
+    (
+        Turning(-31.0 * DEG, largest=30.0 * DEG),
+        ["gyro z, −31 °/s, is beyond", "of any gyro (30 °/s)"],
+    ),
     (
         Turning(-6.4 * DEG, largest=4.5 * DEG, offset_of="datasheet"),
         [
-            "is −6.4 °/s, above the largest plausible offset by its datasheet (4.5 °/s)",
+            "gyro z, −6.4 °/s, is beyond the largest plausible offset by its datasheet (4.5 °/s)",
             "unit is wrong",
         ],
     ),

@@ -23,7 +23,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         TooManyLines(363, 16, 0.0123, 1e-3),
         ["363 sinusoids", "16 strongest", "The other 347", "1.23 %", "0.0573 °/s rms"],
     ),
-    (Filtered(9.8), ["filtered above 9.8 Hz", "N is of the noise before"]),
+    (Filtered(9.8), ["filtered above 9.8 Hz", "N is the value before"]),
     (BandLimit(5.0), ["bends above 5 Hz", "state the bandwidth"]),
     (SlowNoiseMissing(0.1, 0.31), ["Up to 0.1 Hz", "0.31 times", "Switch off automatic zeroing"]),
 ]

@@ -96,10 +96,10 @@ def test_a_step_is_a_sentence(action: Action) -> None:
             "Extend night by 1.5 min to 1.5 min: this could settle 1 verdict and "
             "give 2 verdicts stronger evidence",
         ),
-        (step("add_specimens"), "Record 3 more units: this could settle 1 verdict"),
+        (step("add_specimens"), "Record 3 more specimens: this could settle 1 verdict"),
         (
             step("add_specimens", 0, 1, specimens=1),
-            "Record 1 more unit: this would give 1 verdict stronger evidence",
+            "Record 1 more specimen: this would give 1 verdict stronger evidence",
         ),
     ],
 )  # fmt: skip

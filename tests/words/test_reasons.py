@@ -214,7 +214,11 @@ SIMULATIONS = [
         "typ",
         "why",
     ),
-    of(calibration.describe_printed_noise, "not measured", simulations.of_data_sheet("s", None)),
+    of(
+        calibration.describe_printed_noise,
+        "typical figures (",
+        simulations.of_data_sheet("s", None),
+    ),
     of(
         calibration.describe_static_noise,
         "static recording r; method likelihood",
@@ -223,7 +227,7 @@ SIMULATIONS = [
     ),
     of(
         calibration.describe_static_noise,
-        "of another device, 8, simulated, of its gyro y, as gyro x has",
+        "of another specimen, 8, simulated, of its gyro y, as gyro x has",
         *("r", "likelihood"),
         device="8",
         simulated=True,

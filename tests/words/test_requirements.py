@@ -15,15 +15,15 @@ def asked(**changes: Any) -> str:
 
 def test_a_requirement_states_its_demands() -> None:
     assert asked() == (
-        "Limits: heading within 1 deg after 60 s, in 95 % of runs, for the worst axis; "
-        "biases and tilt estimated over 10 s at rest immediately before."
+        "Limits (95 % of runs, worst axis): heading within 1 deg after 60 s. "
+        "Start: biases and tilt estimated over 10 s at rest."
     )
     text = asked(example=True, note="Only indoors.", axis="median", confidence=0.997)
-    assert text.startswith("Invented example. Limits: ") and text.endswith(". Only indoors.")
-    assert "in 99.7 % of runs, for the median axis" in text
+    assert text.startswith("Invented example. Limits (") and text.endswith(". Only indoors.")
+    assert "(99.7 % of runs, median axis)" in text
     turn_on = {"gyro": "0.2 deg/s", "accel": "20 mg"}
     text = asked(static_window=None, turn_on=turn_on)
-    assert text.endswith("; turn-on biases of 0.2 deg/s and 20 mg, not calibrated.")
+    assert text.endswith(" Start: turn-on biases of 0.2 deg/s and 20 mg, not calibrated.")
 
 
 def test_use_and_demanded_properties_are_sentences() -> None:

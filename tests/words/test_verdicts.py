@@ -134,15 +134,15 @@ def test_every_property_has_words(of: Property) -> None:
     assert is_plain(shortfall_text(without))
     if of not in ("quantity", "axis"):
         assert shortfall_text(replace(without, has=(1.0,))).endswith(
-            (", required 5 g", ", required: a class with 5 g")
+            (", required 5 g", ", required: a class with the word 5 g")
         )
 
 
 @pytest.mark.parametrize(
     ("shortfall", "text"),
     [
-        (Shortfall("quantity", "accel", "accel_x"), "no accelerometer"),
-        (Shortfall("axis", "gyro_z", "gyro_xyz"), "no gyro z axis"),
+        (Shortfall("quantity", "accel", "accel_x"), "the sensor has no accelerometer"),
+        (Shortfall("axis", "gyro_z", "gyro_xyz"), "the sensor has no gyro z axis"),
         (Shortfall("mass", "", "15 g", (0.02,)), "mass 20 g, required 15 g"),
         (
             Shortfall("temperature", "", "-55 degC to 60 degC", (-40.0, 85.0)),
@@ -154,11 +154,11 @@ def test_every_property_has_words(of: Property) -> None:
         ),
         (
             Shortfall("price_class", "consumer", "tactical or chip"),
-            "price class consumer, required: a class with tactical or chip",
+            "price class consumer, required: a class with the word tactical or chip",
         ),
         (
             Shortfall("price_class", "", "tactical"),
-            "price class not stated, required: a class with tactical",
+            "price class not stated, required: a class with the word tactical",
         ),
     ],
 )  # fmt: skip
@@ -180,7 +180,7 @@ def test_a_verdict_has_its_conditions() -> None:
 def test_an_excluded_sensor_has_its_shortfalls() -> None:
     shortfalls = (Shortfall("quantity", "gyro", "x"), Shortfall("mass", "", "15 g", (0.02,)))
     excluded = row(verdict="excluded", shortfalls=shortfalls)
-    assert stated_verdict(excluded) == "excluded: no gyro; mass 20 g, required 15 g"
+    assert stated_verdict(excluded) == "excluded: the sensor has no gyro; mass 20 g, required 15 g"
 
 
 @pytest.mark.parametrize(
@@ -206,7 +206,9 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("misalignment", "gyro", share=0.1, origin="class limit"),
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
-    assert origins_text(shares) == "assumed worst figures 60 %, noise 35 %, datasheet figures 5 %"
+    assert origins_text(shares) == (
+        "unknown figures (assumed worst) 60 %, noise 35 %, other datasheet figures 5 %"
+    )
 
 
 @pytest.mark.parametrize(
@@ -228,9 +230,9 @@ def test_a_class_limit_is_named(
 
 def test_margins_other_than_in_use() -> None:
     both = row(margin=0.5, noise_margin=4.234, likely_margin=0.9)
-    assert other_margins_text(both) == "noise alone 4.23, likely margin 0.9"
+    assert other_margins_text(both) == "noise-only margin 4.23, likely margin 0.9"
     # Where every figure is known, the likely margin is the margin in use.
-    assert other_margins_text(replace(both, likely_margin=0.5)) == "noise alone 4.23"
+    assert other_margins_text(replace(both, likely_margin=0.5)) == "noise-only margin 4.23"
     assert other_margins_text(row()) == ""
 
 
@@ -257,7 +259,7 @@ def test_evidence_is_weak_for_reasons() -> None:
         "no model explains the spectrum of the data"
     )
     assert weak("short_log", "wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
-        "no log longer than 11 min; wide interval from 2 units"
+        "no log longer than 11 min; wide interval from 2 specimens"
     )
     assert weak("wide_interval") == "wide interval"
     marks = (DoubtMark("a", "motion", ("gyro_x",)), DoubtMark("a", "suspicious_unit", ("gyro_z",)))
@@ -338,8 +340,8 @@ def test_one_sentence_names_the_sensors_to_choose() -> None:
         "Bus": row(),
     }
     assert summary_text(best, NAMES) == (
-        "A meets the limits of Rover and Bus. B likely meets the limits of Boat. "
-        "B meets the limits of Drone if 2 unknown figures are good enough. "
+        "Best for Rover and Bus: A (meets the limits). Best for Boat: B (likely meets the limits). "
+        "Best for Drone: B (meets the limits if 2 unknown figures are good enough). "
         "No sensor meets the limits of Car or Truck. "
         "No sensor is shown to meet the limits of Train. No sensor can be judged for Ship."
     )
@@ -419,9 +421,10 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
         row("g", "meets_if", conditions=(SCALE,)),
     ]
     assert others(rows) == (
-        "Also meets the limits: H. Likely meets the limits: E. Meets the limits on conditions: G. "
+        "Also meets the limits: H. Likely meets the limits: E. Meets the limits under conditions: "
+        "G. "
         "Not enough data: D (no accelerometer). Likely fails: C. "
-        "Fails: B. Excluded: F (price class chip, required: a class with tactical)."
+        "Fails: B. Excluded: F (price class chip, required: a class with the word tactical)."
     )
 
 

@@ -270,7 +270,8 @@ def list_error_rows(
                 texts.parameter_status(name, channel, parameter.status)
                 for channel in used
                 for _, name, parameter in estimates[channel].components()
-                if parameter.status in ("not_identified", "at_bound")
+                if name not in estimates[channel].curve
+                and parameter.status in ("not_identified", "at_bound")
             ),
             *(texts.independent_draws(estimates[channel].method, channel) for channel in apart),
             *(

@@ -163,7 +163,7 @@ def compare_with_paper(rows: Sequence[CoverageRow]) -> str:
         "Maia et al. state that most manufacturers document stochastic errors incompletely. "
         f"{complete} of the {len(found)} gyroscopes and accelerometers below have all of "
         f"{join_names(_PAPER_FIGURES)} published. Of those whose "
-        f"documents were searched, {join_names(counts)}."
+        f"documents were checked, {join_names(counts)}."
     )
 
 

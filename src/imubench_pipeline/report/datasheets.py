@@ -111,12 +111,15 @@ def compare_sensors_with_datasheets(
         first = group[0][0]
         unit = choose_page_unit(quantity_of(channel), UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(merge_verdicts(rows)[0] for rows in group)
+        if first.kind in ("max", "range") and "as printed" in verdicts:
+            verdicts["within it"] = verdicts.pop("as printed")
         by_reading = group_rows(chain(*group), _name_reading)
         readings: list[dict[str, str]] = []
         for name, rows in by_reading.items():
             measured = sorted(row.measured for row in rows if row.measured is not None)
             ends = (measured[0], measured[-1]) if measured else (None, None)
-            deltas = _list_deltas(rows)
+            # A figure is not expected to be at the end of a range.
+            deltas = [None] if first.kind == "range" else _list_deltas(rows)
             readings.append(
                 {
                     "as": name,

@@ -87,7 +87,7 @@ def _make_sensor_context(
     return {
         "name": site.names[sensor],
         "simulated": all(view.simulated for view in own),
-        "summary": (f"Price class: {price_class}. " if price_class else "")
+        "summary": (f"Class, price: {price_class}. " if price_class else "")
         + summarise_recordings(own, several=False),
         "answer": verdicts.sensor_answer_text(_list_verdicts(site, sensor)),
         "verdicts": list(trace_verdicts(site, sensor, own)),

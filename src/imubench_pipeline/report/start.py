@@ -253,7 +253,7 @@ def _start(site: Site) -> Mapping[str, object]:
     )
     in_doubt = f"{numbers.counted(len(warned), 'recording')} in doubt"
     if unexpected < len(warned):
-        in_doubt += f", all{f' but {unexpected}' if unexpected else ''} simulated to show it"
+        in_doubt += f", all{f' but {unexpected}' if unexpected else ''} simulated with these faults"
     return {
         "strip": summarise_counts(site),
         "about": " ".join(filter(None, (describe_dates(views), describe_simulated(views)))),
@@ -307,8 +307,12 @@ def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -
     parts = [numbers.counted(len(views), "recording") + of]
     lasting = sum(view.row.duration or 0.0 for view in views)
     parts += [f"{numbers.duration_text(lasting)} of data" if lasting else "", describe_dates(views)]
-    counts = f"{len(views) - rejected - failed} analysed, {rejected} rejected"
+    unused = sum(view.row.decides is False for view in views) - rejected - failed
+    counts = f"{len(views) - rejected - failed} analysed" + f", {rejected} rejected" * bool(
+        rejected
+    )
     counts += f", {failed} failed" * bool(failed)
+    counts += f", {unused} not used in comparisons" * (unused > 0)
     return f"{', '.join(filter(None, parts))}: {counts}. {describe_simulated(views)}".rstrip()
 
 
@@ -384,11 +388,11 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
         decides = next(limit for limit in group.limits if limit.decides)
         differ = len(set(decides.interval.split(" to "))) > 1  # as printed
         interval = Markup(" ({})").format(decides.interval) if differ else ""
-        text = Markup(
-            "Deciding limit: {}. Expected error {}{}, allowed {} (the limit as 1σ)."
-        ).format(decides.limit, decides.sigma, interval, decides.allowed)
+        text = Markup("Deciding limit: {}. Expected error (1σ) {}{}, allowed {}.").format(
+            decides.limit, decides.sigma, interval, decides.allowed
+        )
         if decides.reason:
-            text += f" Not counted: {decides.reason}."
+            text += f" The error may be larger: {decides.reason}."
         yield text + f" {_describe_data(site, group.row)}"  # still markup
         if conditions := group.row.conditions:
             yield f"Conditions: {'; '.join(map(verdicts.condition_text, conditions))}."
@@ -400,7 +404,7 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
     )
     for group in groups:
         if group.corrected:
-            yield f"{site.names[group.sensor]} {group.corrected}."
+            yield f"With its recording in doubt, {site.names[group.sensor]} {group.corrected}."
 
 
 def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
@@ -431,8 +435,10 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     if row.recordings == 1:
         text = f"Data: one recording, {log}; other specimens may differ."
     else:
-        units = f" of {numbers.counted(row.specimens, 'unit')}" if row.specimens is not None else ""
-        text = f"Data: {row.recordings} recordings{units}; {log} is nearest to the prediction."
+        of = (
+            f" of {numbers.counted(row.specimens, 'specimen')}" if row.specimens is not None else ""
+        )
+        text = f"Data: {row.recordings} recordings{of}; {log} is nearest to the prediction."
     if spread := verdicts.spread_text(row):
         text += f" Spread: {spread}."
     if row.doubts:

@@ -40,9 +40,9 @@ METHOD_NAMES = {
     "likelihood_gm": "likelihood, model N+GM+K",
     "compensated": "temperature compensated",
     "curve": "read from the curve",
-    "paper": "fit, weights as printed",
+    "paper": "fit, weights of Maia et al.",
     "weighted": "fit, correct weights",
-    "authors": "read by the authors",
+    "authors": "values of the authors",
 }
 _CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}

@@ -149,9 +149,9 @@ _UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
 """Likely unit mistake for each factor that corrects the data."""
 
 _SPREAD_OF: Mapping[SpreadOf, str] = {
-    "specimens": "between units",
+    "specimens": "between specimens",
     "recordings": "between recordings of one unit",
-    "other sensors": "between units of other sensors",
+    "other sensors": "between specimens of other sensors",
 }
 
 
@@ -225,13 +225,13 @@ def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
         stated = shortfall.subject or "not stated"
-        return f"price class {stated}, required: a class with {shortfall.asked}"
+        return f"price class {stated}, required: a class with the word {shortfall.asked}"
     name = _name_property(shortfall.property, shortfall.subject)
     _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":
         unit, dimension = _FULL_SCALES[shortfall.subject]
     if not shortfall.has:
-        return f"no {name}"
+        return f"the sensor has no {name}"
     own = " to ".join(f"{convert_from_si(value, unit, dimension):.4g}" for value in shortfall.has)
     return f"{name} {own} {unit}, required {shortfall.asked}"
 
@@ -248,7 +248,7 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
     parts: dict[str, float] = {}
     for share in shares:
         noise = share.is_noise and share.origin != "class limit"
-        name = "noise" if noise else f"{_ORIGIN_WORDS[share.origin or 'measured']} figures"
+        name = "noise" if noise else _ORIGINS_OF_FIGURES[share.origin or "measured"]
         parts[name] = parts.get(name, 0.0) + share.share
     largest_first = sorted(parts.items(), key=lambda part: -part[1])
     shown = [(name, round(100.0 * part)) for name, part in largest_first if part >= 0.005]
@@ -257,6 +257,12 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
     return ", ".join(f"{name} {percent} %" for name, percent in shown)
 
 
+_ORIGINS_OF_FIGURES: Mapping[Origin, str] = {
+    "measured": "other measured figures",
+    "datasheet": "other datasheet figures",
+    "class limit": "unknown figures (assumed worst)",
+    "requirement": "stated figures",
+}
 _ORIGIN_WORDS: Mapping[Origin, str] = {
     "measured": "measured",
     "datasheet": "datasheet",
@@ -316,7 +322,7 @@ def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
             length = duration_text(row.longest_log)
             return f"one log of {length}" if row.recordings == 1 else f"no log longer than {length}"
         case "wide_interval" if row.spread_of == "specimens":
-            return f"wide interval from {row.specimens} units"
+            return f"wide interval from {row.specimens} specimens"
         case "wide_interval":
             return "wide interval"
         case "few_axes":
@@ -342,10 +348,10 @@ def used_doubts_text(row: comparisons.RankingRow) -> str:
 
 
 def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -> str:
-    """Return the further margins of a row: ``noise alone 4.2, likely margin 0.9``."""
+    """Return the further margins of a row: ``noise-only margin 4.2, likely margin 0.9``."""
     parts = []
     if row.noise_margin is not None:
-        parts.append(f"noise alone {number_text(row.noise_margin, 3)}")
+        parts.append(f"noise-only margin {number_text(row.noise_margin, 3)}")
     likely = number_text(row.likely_margin, 3)
     if row.likely_margin is not None and likely != number_text(row.margin, 3):
         parts.append(f"likely margin {likely}")
@@ -353,14 +359,14 @@ def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -
 
 
 _ANSWERS: Mapping[Verdict, str] = {
-    "meets": "Meets the limits of {}.",
-    "likely_meets": "Likely meets the limits of {}.",
-    "meets_if": "Meets the limits of {} if unknown figures are as required.",
-    "not_enough_data": "Not enough data for {}.",
-    "likely_fails": "Likely fails the limits of {}.",
-    "fails": "Fails the limits of {}.",
-    "cannot_meet": "Cannot meet the limits of {}.",
-    "excluded": "Excluded from {}.",
+    "meets": "Meets the limits: {}.",
+    "likely_meets": "Likely meets the limits: {}.",
+    "meets_if": "Meets the limits if unknown figures are as required: {}.",
+    "not_enough_data": "Not enough data: {}.",
+    "likely_fails": "Likely fails the limits: {}.",
+    "fails": "Fails the limits: {}.",
+    "cannot_meet": "Cannot meet the limits: {}.",
+    "excluded": "Excluded: {}.",
 }
 
 
@@ -378,7 +384,7 @@ def sensor_answer_text(judged: Iterable[tuple[str, Verdict]]) -> str:
 
 
 def spread_text(row: comparisons.RankingRow) -> str:
-    """Return the spread between units, of a row of ``ranking``; empty if it is not known."""
+    """Return the spread between specimens, of a row of ``ranking``; empty if it is not known."""
     if row.spread is None or row.spread_of is None:
         return ""
     return f"{percent_text(row.spread, 2)} {_SPREAD_OF[row.spread_of]}"
@@ -456,25 +462,25 @@ def summary_text(
     ``best`` has, by title of the requirement, the deciding row of the best judged sensor; None if
     none is judged. ``names`` has the shown name of each sensor.
     """
-    groups: dict[tuple[str, str], list[str]] = {}
+    groups: dict[str, list[str]] = {}
     for requirement, row in best.items():
         name = names[row.sensor] if row else "No sensor"
         if row is None:
-            key = "No sensor can be judged for", ""
+            text = "No sensor can be judged for {}."
         elif row.verdict in ("meets", "likely_meets"):
-            key = f"{name} {VERDICT_WORDS[row.verdict]} of", ""
+            text = f"Best for {{}}: {name} ({VERDICT_WORDS[row.verdict]})."
         elif row.verdict == "meets_if":
             number = len(row.conditions)
-            end = f" if {counted(number, 'unknown figure')} {'is' if number == 1 else 'are'}"
-            key = f"{name} meets the limits of", f"{end} good enough"
+            end = f"if {counted(number, 'unknown figure')} {'is' if number == 1 else 'are'}"
+            text = f"Best for {{}}: {name} (meets the limits {end} good enough)."
         elif row.verdict in ("fails", "cannot_meet"):
-            key = "No sensor meets the limits of", ""
+            text = "No sensor meets the limits of {}."
         else:
-            key = "No sensor is shown to meet the limits of", ""
-        groups.setdefault(key, []).append(requirement)
+            text = "No sensor is shown to meet the limits of {}."
+        groups.setdefault(text, []).append(requirement)
     return " ".join(
-        f"{of} {join_names(which, 'or' if of.startswith('No sensor') else 'and')}{end}."
-        for (of, end), which in groups.items()
+        text.format(join_names(which, "or" if text.startswith("No sensor") else "and"))
+        for text, which in groups.items()
     )
 
 
@@ -489,7 +495,7 @@ def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]
         for row in listed:
             if row.verdict == verdict:
                 text = "also " * (verdict == "meets") + VERDICT_WORDS[verdict]
-                heading = text[:1].upper() + text[1:] + " on conditions" * bool(row.conditions)
+                heading = text[:1].upper() + text[1:] + " under conditions" * bool(row.conditions)
                 why = [*map(shortfall_text, row.shortfalls)]
                 why += row.reasons if verdict == "not_enough_data" else ()
                 text = f"{names[row.sensor]} ({'; '.join(why)})" if why else names[row.sensor]
@@ -506,7 +512,7 @@ _SINGULAR = re.compile(r"\b([Mm]eet|[Ff]ail)s\b")
 
 
 def next_step_text(step: comparisons.NextStepRow, *, brief: bool = False) -> str:
-    """Return a next step: ``Record 3 more units: this could settle 1 verdict``, or ``brief``."""
+    """Return a next step: ``Record 3 more specimens: this could …``, or ``brief``."""
     parts = []
     if step.verdicts_turned:
         changed = counted(step.verdicts_turned, "verdict")
@@ -543,7 +549,7 @@ def _describe_action(step: comparisons.NextStepRow, *, brief: bool) -> str:
             more = step.duration - (step.logged or 0.0)
             return f"Extend {recording} by {_round_up(more)} to {_round_up(step.duration)}"
         case "add_specimens":
-            return f"Record {counted(step.specimens or 0, 'more unit', 'more units')}"
+            return f"Record {counted(step.specimens or 0, 'more specimen', 'more specimens')}"
 
 
 _MEASURING: Mapping[SourceCode, str] = {
@@ -579,9 +585,7 @@ def requirement_text(requirement: Requirement) -> str:
     """Return the demands of a requirement in sentences."""
     limits = "; ".join(limit.text for limit in requirement.limits)
     if requirement.static_window:
-        begin = (
-            f"biases and tilt estimated over {requirement.static_window} at rest immediately before"
-        )
+        begin = f"biases and tilt estimated over {requirement.static_window} at rest"
     elif requirement.turn_on:
         stated = (requirement.turn_on.gyro, requirement.turn_on.accel)
         biases = " and ".join(bias or "the datasheet" for bias in stated)
@@ -590,8 +594,8 @@ def requirement_text(requirement: Requirement) -> str:
         begin = ""
     parts = [
         "Invented example." if requirement.example else "",
-        f"Limits: {limits}, in {100 * requirement.confidence:g} % of runs, for the "
-        f"{requirement.axis} axis{begin and f'; {begin}'}.",
+        f"Limits ({100 * requirement.confidence:g} % of runs, {requirement.axis} axis): {limits}.",
+        f"Start: {begin}." if begin else "",
         _stated("In use", requirement.environment),
         _stated("A sensor must have", requirement.must),
         f"{requirement.note.rstrip('.')}." if requirement.note else "",

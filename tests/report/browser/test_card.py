@@ -13,7 +13,7 @@ def test_the_card_is_saved_as_one_picture(read: Open, bench: Report, tmp_path: P
     reader = read(bench.folder, "sensors/alpha.html")
     reader.figure("axes", quantity="gyro")
     with reader.page.expect_download() as saved:
-        reader.page.get_by_role("button", name="Save this card as PNG").click()
+        reader.page.get_by_role("button", name="Save this summary as PNG").click()
     saved.value.save_as(tmp_path / "card.png")
     data = (tmp_path / "card.png").read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"

@@ -90,7 +90,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             assert words(ratio, first, second) in rows[f"adev {tau:g}"]["texts"][1]
     # Three times the noise, and no doubt of it.
     assert "Other B has less noise" not in reader.page.locator(".answer").inner_text()
-    assert "N (3 times)" in reader.page.locator(".answer").inner_text()
+    assert "N (factor 3)" in reader.page.locator(".answer").inner_text()
 
 
 @pytest.mark.release
@@ -143,7 +143,7 @@ def test_errors_grow_as_the_budget_has_it(read: Open, bench: Report) -> None:
     at = curve["x"].index(10.0)
     expected = math.degrees(budget[NIGHT.recording, "heading"]["sigma"])
     assert curve["y"][at] == pytest.approx(expected, rel=DRAWN)
-    reader.page.get_by_label("At rest before").press("End")
+    reader.page.get_by_label("Time at rest").press("End")
     after = next(one for one in traces(figure) if one["mode"] == "lines+markers")
     growth = made.growth_of(NIGHT)
     (rested,) = (
@@ -217,7 +217,7 @@ def test_what_is_chosen_stands_in_the_address(
     # The default of a sensor is its longest usable measured recording; others can be chosen.
     said = page.locator(".stands").inner_text()
     assert f"{NIGHT.recording} is shown" in said and "1 more above" in said
-    page.get_by_role("button", name="+ one more").click()
+    page.get_by_role("button", name="Add a sensor").click()
     page.locator("select[data-letter=c]").select_option(f"alpha/{SIMULATED.recording}")
     page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
     figure = reader.figure("pair")

@@ -175,7 +175,7 @@ def test_the_answer_is_on_the_first_screen(
             assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]  # drawn
     # One sentence, and the picture of all margins.
     chosen = page.locator(".chosen").inner_text()
-    assert "A-1 meets the limits of Rover." in chosen
+    assert "Best for Rover: Vendor & Sons A-1 (meets the limits)." in chosen
     assert chosen.endswith("No sensor is shown to meet the limits of Wheels.")
     assert page.locator(".margins .row[data-sensor]").count() == len(made.SENSORS)
     last = page.locator(".margins").bounding_box()

@@ -15,7 +15,7 @@ TUNINGS = {
     "datasheet": "datasheet",
     "datasheet_misread": "datasheet misread",
     "times_ten": "ten times the estimate",
-    "table_1": "read by the authors",
+    "table_1": "values of the authors",
     "overbound": "overbound",
     "curve": "read from the curve",
     "paper": "printed weights",

@@ -10,10 +10,7 @@ NO_MODEL = (
 
 
 def describe_printed_noise(source: str) -> str:
-    return (
-        f"typical figures of {source}, not measured. No static recording of this sensor determines "
-        "its noise"
-    )
+    return f"typical figures ({source}). No static recording of this sensor determines its noise"
 
 
 def describe_static_noise(
@@ -31,7 +28,7 @@ def describe_static_noise(
     """
     words = [f"static recording {recording}"]
     if device is not None:
-        words.append(f"of another device, {device}")
+        words.append("of another specimen" + f", {device}" * (device != recording))
     if simulated:
         words.append("simulated")
     if channels is not None:

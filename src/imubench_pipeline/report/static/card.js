@@ -5,7 +5,7 @@ const CARD = { width: 1600, height: 900, edge: 40 };
 function startCard(root) {
   const card = root.querySelector(".card");
   if (!card?.querySelector("figure")) return;
-  card.querySelector(".links").append(element("button", { type: "button", textContent: "Save this card as PNG", onclick: () => saveCard(card) }));
+  card.querySelector(".links").append(element("button", { type: "button", textContent: "Save this summary as PNG", onclick: () => saveCard(card) }));
 }
 
 async function saveCard(card) {

@@ -99,7 +99,7 @@ function drawPickers(pickers, axes) {
     remove.setAttribute("aria-label", `Remove ${one.name}`);
     return element("span", {}, label, remove);
   });
-  const more = element("button", { type: "button", textContent: "+ one more", hidden: chosen.length >= Math.min(LETTERS.length, pageData.recordings.length), onclick: () => {
+  const more = element("button", { type: "button", textContent: "Add a sensor", hidden: chosen.length >= Math.min(LETTERS.length, pageData.recordings.length), onclick: () => {
     const used = new Set(chosen.map((one) => `${one.sensor}/${one.recording}`));
     const next = pageData.recordings.find((row) => !chosen.some((one) => one.sensor === row.sensor))
       ?? pageData.recordings.find((row) => !used.has(`${row.sensor}/${row.recording}`));
@@ -208,7 +208,7 @@ function drawVerdicts(root, figures) {
   const missing = chosen.filter((one) => !channelFor(one, chosenChannel));
   table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map((one) => one.name)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
-  table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better; significant where the 95 % interval of the ratio excludes 1`;
+  table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: noise of the sensors and its ratio. A difference is significant where the 95 % interval of the ratio excludes 1`;
   table.closest(".scroll").hidden = missing.length > 0;
   root.querySelector("figure[data-kind=pair]").hidden = missing.length === chosen.length;
   root.querySelector("figure[data-kind=dumbbells]").hidden = missing.length > 0;
@@ -232,7 +232,7 @@ function sentenceOf(figures, first, second, place) {
   for (const figure of figures) {
     const ratio = figure.ratios[place];
     const { text, kind } = verdictOf(ratio, first, second);
-    const times = ratio.value === null ? "" : ` (${numberText(ratio.value < 1 ? 1 / ratio.value : ratio.value, 2)} times)`;
+    const times = ratio.value === null ? "" : ` (factor ${numberText(ratio.value < 1 ? 1 / ratio.value : ratio.value, 2)})`;
     if (!groups.has(text)) groups.set(text, { better: kind === "significant", of: [] });
     groups.get(text).of.push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (kind === "significant" ? times : ""));
   }
@@ -243,7 +243,7 @@ function sentenceOf(figures, first, second, place) {
 
 function drawEvidence(root) {
   const table = root.querySelector("table.evidence");
-  table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Units of the sensor", "Temperature", "Rate", "Warnings"));
+  table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Specimens", "Temperature", "Rate", "Warnings"));
   table.tBodies[0].replaceChildren(...chosen.map((one) => {
     const { row } = one;
     const own = pageData.recordings.filter((other) => other.sensor === one.sensor);

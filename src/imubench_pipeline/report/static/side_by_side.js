@@ -258,7 +258,7 @@ function startGrowth(root) {
       redrawAll();
     });
   }
-  form.replaceChildren(labelled("Error", select), labelled("Axes", axes), slider("window", windows, "At rest before"), slider("time", times, "After"));
+  form.replaceChildren(labelled("Error", select), labelled("Axes", axes), slider("window", windows, "Time at rest"), slider("time", times, "Time of dead reckoning"));
 }
 
 function errorUnit(error, size) {

@@ -59,7 +59,7 @@ class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channel
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         return (
             f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
-            f"(± {number_text(self.time_error, 2)} s). It is removed from the noise"
+            f"(± {number_text(self.time_error, 2)} s). This step is removed from the noise"
             f"{removal_text(self.factors)}. "
             "Look for a motion, a new range or a sudden change of temperature"
         )
@@ -114,7 +114,7 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
         if self.has_temperature:
             advice = "Compare with the temperature, and with the method compensated"
         return (
-            f"The bias of {channel_name(channel)} {motion}. It is removed from the noise"
+            f"The bias of {channel_name(channel)} {motion}. This motion is removed from the noise"
             f"{removal_text(self.factors)}. {advice}"
         )
 

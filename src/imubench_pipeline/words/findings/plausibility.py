@@ -106,7 +106,7 @@ class SuspiciousUnit(
             assert self.noise is not None
             assert self.usual is not None
             unit = base.unit_of(channel, "density")
-            seen = f"its noise is {unit.text(self.noise)} {unit.sign}"
+            seen = f"the noise is {unit.text(self.noise)} {unit.sign}"
             if self.mean is not None:
                 seen += f", and the mean rate {base.value_text(self.mean, channel)}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
@@ -114,7 +114,7 @@ class SuspiciousUnit(
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
         return (
             f"The unit of {name} is probably wrong: {seen}; {usual}. If the log is in "
-            f"{self.likely}, and not {self.stated}, it is {mended}. {_CORRECT_UNIT}"
+            f"{self.likely}, and not {self.stated}, this is {mended}. {_CORRECT_UNIT}"
         )
 
 
@@ -148,12 +148,13 @@ class NoiseUnlikeDatasheet(
 
     def text(self, channel: str) -> str:
         name, unit = base.channel_name(self.measured_on), base.unit_of(self.measured_on, "density")
-        rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
+        rate = f"the sampling rate ({number_text(self.stated_rate)} Hz is stated), "
         return (
             f"The noise of {name} is {unit.text(self.noise)} {unit.sign}, "
             f"{number_text(self.noise / self.printed, 3)} times the "
             f"{unit.text(self.printed)} of its datasheet. "
-            f"Check {rate}scale, range and column of the channel, and whether it is this sensor"
+            f"Check {rate * bool(self.stated_rate)}scale, range and column of the channel, and "
+            "that the log is of this sensor"
         )
 
 
@@ -201,7 +202,7 @@ class Turning(base.FindingData, affects=base.ALL, unfit=True, doubt="the sensor 
                 self.offset_of, f"of price class {self.offset_of}"
             )
             return (
-                f"The mean rate of {base.channel_name(channel)} is {rate} °/s, above the largest "
+                f"The mean rate of {base.channel_name(channel)}, {rate} °/s, is beyond the largest "
                 f"plausible offset {limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
                 "The sensor is turning, or the unit is wrong. "
                 "Record with the sensor at rest, or correct the unit"

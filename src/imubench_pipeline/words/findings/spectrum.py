@@ -92,8 +92,8 @@ class Filtered(FindingData, affects=NONE):
     def text(self, channel: str) -> str:
         return (
             f"The noise of {channel_name(channel)} is filtered above {number_text(self.cutoff, 3)} "
-            "Hz, as by a low-pass of the sensor. The Allan deviation bends at its short end. N is "
-            "of the noise before the filter"
+            "Hz, as by a low-pass of the sensor. The Allan deviation bends at short τ. N is the "
+            "value before the filter"
         )
 
 
