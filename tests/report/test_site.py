@@ -200,14 +200,13 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
         rejected_rows("b", "r"),
     ).views
     assert summarise_recordings(views) == (
-        "3 recordings of 2 sensors, 4 h of data, recorded from 2023-12-31 to 2024-02-03: "
-        "2 analysed, 1 rejected. 1 of them is simulated, not measured."
+        "3 recordings of 2 sensors, 4 h of data, recorded from 2023-12-31 to 2024-02-03, "
+        "1 rejected. 1 of them is simulated, not measured."
     )
     assert summarise_recordings(views[1:2], several=False) == (
-        "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed. "
-        "It is simulated, not measured."
+        "1 recording, 2 h of data, recorded on 2023-12-31. It is simulated, not measured."
     )
-    assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed."
+    assert summarise_recordings([]) == "0 recordings of 0 sensors."
 
 
 def test_recompute_command_includes_the_settings_of_the_run() -> None:

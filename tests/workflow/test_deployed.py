@@ -258,7 +258,7 @@ def test_a_wheel_analyses_a_folder_of_logs_as_a_checkout_does(ways: Ways, logs: 
     ended(ways.imubench("init", lab), ways.folder)
     with_logs(lab, logs)
     said = ended(ways.imubench("run", lab, "-c2", "--", "--config", *GIVEN), ways.folder)
-    assert "1 recording analysed" in said and len(said.splitlines()) < 20, said
+    assert "1 recording analysed, 0 rejected" in said and len(said.splitlines()) < 20, said
     assert (lab / "results/report/index.html").is_file()
     expected = left(ways.checkout / "results")  # of one core, and these of two
     assert {"tables/parameters.csv", "tables/shortlist.parquet"} < expected.keys()

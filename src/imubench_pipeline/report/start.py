@@ -303,17 +303,14 @@ def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
-    of = f" of {numbers.counted(len(sensors), 'sensor')}" if several else ""
-    parts = [numbers.counted(len(views), "recording") + of]
+    among = f" of {numbers.counted(len(sensors), 'sensor')}" if several else ""
+    parts = [numbers.counted(len(views), "recording") + among]
     lasting = sum(view.row.duration or 0.0 for view in views)
     parts += [f"{numbers.duration_text(lasting)} of data" if lasting else "", describe_dates(views)]
     unused = sum(view.row.decides is False for view in views) - rejected - failed
-    counts = f"{len(views) - rejected - failed} analysed" + f", {rejected} rejected" * bool(
-        rejected
-    )
-    counts += f", {failed} failed" * bool(failed)
-    counts += f", {unused} not used in comparisons" * (unused > 0)
-    return f"{', '.join(filter(None, parts))}: {counts}. {describe_simulated(views)}".rstrip()
+    states = {"rejected": rejected, "failed": failed, "not used in comparisons": max(unused, 0)}
+    parts += [f"{count} {state}" for state, count in states.items() if count]
+    return f"{', '.join(filter(None, parts))}. {describe_simulated(views)}".rstrip()
 
 
 def describe_dates(views: Sequence[RecordingView]) -> str:
