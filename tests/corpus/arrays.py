@@ -192,7 +192,7 @@ ARROW = [
         "parquet without records",
         parquet(lambda: table()[:0]),
         STAMPED,
-        Rejected(r"log\.parquet: no record"),
+        Rejected(r"log\.parquet: no rows"),
     ),
     Entry(
         "parquet of text",
@@ -222,7 +222,9 @@ ARROW = [
         "parquet with a name of 30 kB",
         parquet(lambda: table().rename_columns(["t", "wx", "n" * 30_000])),
         STAMPED,
-        Rejected(r"no variable or column 'az' for accel_z; .* column n{90,}\.\.\.; mend 'column'"),
+        Rejected(
+            r"no variable or column 'az' for accel_z; .* column n{90,}\.\.\.; correct 'column'"
+        ),
     ),
     Entry("feather", parquet(name="log.feather", kind="feather"), STAMPED, kept(ROWS)),
     Entry(

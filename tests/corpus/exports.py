@@ -70,7 +70,7 @@ TEXTS = [
         "xsens without the stamps that are named",
         file(XSENS, "MT_1.txt"),
         {"time": TICKS, "channels": CHANNELS},
-        Rejected(r"MT_1\.txt: no time stamp in the first \d+ records; mend 'column'"),
+        Rejected(r"MT_1\.txt: no time stamp in the first \d+ records; correct 'column'"),
     ),
     Entry(
         "xsens cut in a record",

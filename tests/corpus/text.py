@@ -122,7 +122,7 @@ LAYOUTS = [
         "csv without a column that is named",
         file(lambda: instead("t,wx,ay\n", 0)),
         STAMPED,
-        Rejected(r"log\.csv: no column 'az' for accel_z; found t, wx, ay .*mend 'column'"),
+        Rejected(r"log\.csv: no column 'az' for accel_z; found t, wx, ay .*correct 'column'"),
     ),
     Entry(
         "csv with a name of 500 kB",
@@ -134,7 +134,7 @@ LAYOUTS = [
         "csv without the column of time",
         file(lambda: instead("s,wx,az\n", 0)),
         STAMPED,
-        Rejected(r"log\.csv: no column 't' for time; found s, wx, az .*mend 'column'"),
+        Rejected(r"log\.csv: no column 't' for time; found s, wx, az .*correct 'column'"),
     ),
     Entry(
         "csv with a line of units",

@@ -224,7 +224,9 @@ def test_the_kind_of_message_is_asked_for(tmp_path: Path, figures: Columns) -> N
     ):
         columns(path, variable="sensor_gyro_0", time=STAMP, gyro_x="gyro_rad[0]")
     path = written(tmp_path, made.dataflash(figures))
-    with pytest.raises(RecordingError, match=r"called IMU_7; found IMU_0, IMU_1, PARM, BAT; mend"):
+    with pytest.raises(
+        RecordingError, match=r"called IMU_7; found IMU_0, IMU_1, PARM, BAT; correct"
+    ):
         columns(path, variable="IMU_7", time=TIME_US, gyro_x="GyrX")
 
 

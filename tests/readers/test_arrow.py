@@ -195,7 +195,7 @@ def test_a_name_that_stands_twice(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_record_and_no_column(tmp_path: Path, kind: str) -> None:
     channels = {"gyro_x": {"column": "wx"}}
-    refused(saved(tmp_path / "a", sample()[:0], kind), log(channels), "no record")
+    refused(saved(tmp_path / "a", sample()[:0], kind), log(channels), "no rows")
     refused(
         saved(tmp_path / "b", pa.table({}), kind), log({"gyro_x": {"column": 1}}), "has no column"
     )

@@ -183,7 +183,7 @@ def long(bad: str, behind: int = 1) -> Callable[[], str]:
     [
         ("", "the file is empty"),
         ("wx,ax\n", "no record after the header"),
-        ("wx,ay\n" + ROWS, r"no column 'ax' for accel_x; found wx, ay .*; mend 'column'"),
+        ("wx,ay\n" + ROWS, r"no column 'ax' for accel_x; found wx, ay .*; correct 'column'"),
         ("wx,ax\n1,2\nx7,3\n1,2\n", r"a.csv, line 3, column 'wx': found 'x7', expected a number"),
         ("// c\nwx,ax\n1,2\n5,6,7\n1,2\n", r"line 4: found 3 columns, expected 2: '5,6,7'"),
         ("wx,ax\n1,2\n5\n1,2\n", r"line 3: found 1 columns, expected 2"),

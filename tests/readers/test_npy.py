@@ -160,7 +160,7 @@ def test_what_is_no_numbers_is_refused(tmp_path: Path, array: np.ndarray, messag
     [
         ({"gyro_x": {"column": 5, "variable": "m"}}, {}, "no column 5 for gyro_x; m has 4 columns"),
         ({"gyro_x": {"column": 1}}, {}, r"several variables \(m, v, r\); name the one of gyro_x"),
-        ({"gyro_x": {"column": 1, "variable": "w"}}, {}, "no variable 'w'.*has m, v, r; mend"),
+        ({"gyro_x": {"column": 1, "variable": "w"}}, {}, "no variable 'w'.*has m, v, r; correct"),
         ({"gyro_x": {"column": "m"}}, {}, "'m' for gyro_x is a matrix of 4 columns; name one"),
         ({"gyro_x": {"column": "m[5]"}}, {}, "no column 5 for gyro_x; m has 4 columns"),
         ({"gyro_x": {"column": "q"}}, {}, "no variable or column 'q' .* has m, v, r, column a, "),
@@ -214,7 +214,7 @@ def test_wrong_stamps(tmp_path: Path) -> None:
     np.savez(path, d=dates, n=nat, m=np.array(["2024-01", "2024-02"], "M8[M]"), w=np.zeros(2))
     for column, message in [
         ("d", "dates before 1678 or after 2262"),
-        ("n", "no time stamp in the first 2 records; mend 'column'"),
+        ("n", "no time stamp in the first 2 records; correct 'column'"),
         ("m", "dates in units of M; expected D, h, m, s, ms, us, ns"),
     ]:
         time = {"column": column, "format": "iso8601"}

@@ -180,7 +180,7 @@ def test_counters_that_start_again(tmp_path: Path, rng: np.random.Generator) -> 
         (["2021-01-01T00:00:00Z", "x"], "iso8601", r"line 3, column 't': found 'x'"),
         (["2021-01-01 00:00Z", "2021-01-01 00:01"], "iso8601", r"line 3, column 't'"),
         (["2021-01-01 00:00", "2021-01-01 00:01Z"], "iso8601", r"line 3, column 't'"),
-        (["-", "nan", "nan"], "%H:%M", r"no time stamp in the first 3 records; mend 'column'"),
+        (["-", "nan", "nan"], "%H:%M", r"no time stamp in the first 3 records; correct 'column'"),
         (["0", "1", "x"], "ns", r"line 4, column 't': found 'x', expected a time stamp"),
     ],
 )
@@ -212,7 +212,7 @@ def test_a_bad_stamp_late_in_a_log_is_named_by_its_line(tmp_path: Path) -> None:
         ({"column": "t", "format": "%T", "wraps": 5}, "need numeric stamps; drop 'format'"),
         ({"column": "t", "unit": "s", "date": "d"}, "'date' is given without 'format'"),
         ({"column": "t", "format": "%T", "date": 0}, "columns are counted from 1"),
-        ({"column": "t"}, "expected either 'unit'"),
+        ({"column": "t"}, "expected exactly one of 'unit'"),
     ],
 )
 def test_what_cannot_be_stated(time: dict[str, Any], message: str) -> None:

@@ -104,7 +104,7 @@ def test_missing_cells_written_as_nan(tmp_path: Path, data: np.ndarray) -> None:
 
 def test_an_empty_column_of_stamps_is_named(tmp_path: Path, data: np.ndarray) -> None:
     path = written(tmp_path, export(SHORT, "\t", np.arange(400), data))
-    with pytest.raises(RecordingError, match=r"no time stamp in the first 400 records; mend 'col"):
+    with pytest.raises(RecordingError, match=r"no time stamp in the first 400 records; correct"):
         columns(path, log_format(CHANNELS, time=TICKS))
 
 

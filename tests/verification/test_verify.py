@@ -278,7 +278,7 @@ def test_an_older_form_is_told_in_one_line(
         write_sealed_json(read_sealed_json(path) | {"form": "0"}, path)
     status, lines = verified(results, capsys)
     assert status == 1 and len(lines) == 2
-    assert "steps of another version; to mend: snakemake -c2 --config" in lines[0]
+    assert "steps of another version; to correct it: snakemake -c2 --config" in lines[0]
     shutil.rmtree(results / "seals")
     status, lines = verified(results, capsys)
     assert status == 1 and len(lines) == 1
@@ -326,7 +326,7 @@ def test_the_command_of_a_fault_names_the_file_and_the_run(
     expected = read_seal(results, "tables").outputs["tables/allan.csv"].size
     assert lines[0].startswith(
         f"{path}: expected {expected} bytes, found {expected - 1}; "
-        f"to mend: rm {path} && snakemake -c2 --config sensors=sensors"
+        f"to correct it: rm {path} && snakemake -c2 --config sensors=sensors"
     )
     assert lines[1].endswith(": 1 faults")
 

@@ -38,11 +38,11 @@ _MAX_NORM_ERROR_AT_REST = 0.15
 
 
 def get_measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return the measured value with limits that a printed figure is compared with, SI.
+    """Return the measured value, with limits, to compare with a printed figure, SI.
 
-    Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, over the averaging times
-    tau, s, shape (m,). The limits of any other point of the curve are at least as wide as 95 %: all
-    amplitudes are at the same end of their intervals, and each correlation time at either end.
+    Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, at averaging times
+    ``tau``, s, shape (m,). The limits at any other point are the extremes of the curve and of four
+    more: all amplitudes at their lower or upper limits, and all T_B at their lower or upper limits.
     """
     statistic = entry.statistic
     if statistic in ("plateau", "adev_minimum"):

@@ -192,7 +192,7 @@ class _Search:
         return solution / size, float(residual)
 
     def estimate(self) -> Estimate:
-        """Return the estimate at the best T_B."""
+        """Return the estimate at the T_B with the least cost."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN_TIMES)
         costs = [self._solved(self._shape(T_B))[1] for T_B in scan.tolist()]
         best = int(np.argmin(costs))

@@ -56,7 +56,7 @@ def choose_deviation_unit(quantity: str | None) -> Unit:
 
 
 def draw_curves(axes: "Axes", curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
-    """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
+    """Draw Allan deviations with 95 % limits, and the slopes of white noise and random walk."""
     unit = choose_deviation_unit(quantity)
     looks = cycle(assign_sensor_styles([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):

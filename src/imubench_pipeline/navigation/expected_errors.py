@@ -91,7 +91,7 @@ class Question:
         return ("gyro",) if self.error in ("heading", "cross_track", "north") else MEASURED
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the error budget with these axes of a gyro and an accelerometer."""
+        """Return the error budget for this axis of a gyro and this axis of an accelerometer."""
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).heading(self.time)
         return self._after(self.time, gyro, accel)

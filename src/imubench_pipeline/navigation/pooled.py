@@ -203,11 +203,11 @@ def _solve_spread_squared(points: list[_Point], target: float) -> float:
 
 
 def estimate_turn_on_bias(means: Iterable[float | None]) -> Pool:
-    """Return the mean fixed bias and its spread between recordings: d(u), Maia et al., equation 1.
+    """Return the mean fixed bias, and its spread between recordings: d(u), Maia et al., equation 1.
 
-    The limits of the mean are by Student's t; the limits of the spread are by the chi-squared
-    distribution of (K - 1) s^2 / sigma^2. It includes slow noise and changes of tilt. Means are in
-    rad/s or m/s^2; None and NaN are left out.
+    ``means`` are in rad/s or m/s^2; None and NaN are left out. The limits of the mean are by
+    Student's t. The limits of the spread s are by the chi-squared distribution of (n - 1) s^2 /
+    sigma^2, for n means. The spread includes slow noise and changes of tilt.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]

@@ -111,7 +111,10 @@ def _add_states(
 def reconstructed_variance(
     model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64], rng: np.random.Generator
 ) -> Array:
-    """Return the Allan variance of one full-length simulated log, shape (m,) (see `ensemble`)."""
+    """Return the Allan variance of one full-length simulated log at ``sizes``, shape (m,).
+
+    The arguments are as in `ensemble`.
+    """
     phase = integrate(simulate_blocks(model, rate, samples, rng), samples, holes=False)
     return of_phase(phase, rate, sizes).variance
 
@@ -126,8 +129,8 @@ def ensemble(
 ) -> Array:
     """Return the Allan variances of an ensemble of simulated logs, shape (members, m).
 
-    They are in (rad/s)² or (m/s²)², at ``sizes``, shape (m,), n of each tau, of logs of ``samples``
-    at a rate in Hz.
+    They are in (rad/s)² or (m/s²)². ``sizes``, shape (m,), are the cluster sizes in samples; each
+    log has ``samples`` samples at a rate in Hz.
     """
     width = max(1, -(-samples // _MAX_BLOCK_SUMS))
     long = sizes >= (_MIN_BLOCKS_IN_CLUSTER * width if width > 1 else 1)

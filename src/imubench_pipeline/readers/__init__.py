@@ -110,7 +110,7 @@ def _find_file(
         what = f"{len(found)} files" if found else "no file"
         raise RecordingError(
             f"{path.name}: {what} {source.file!r} for {name}; the folder has "
-            f"{_join_names(path, found or present)}; mend 'file' of {name} in "
+            f"{_join_names(path, found or present)}; correct 'file' of {name} in "
             f"{name_settings_file(name)}"
         )
     return found[0]

@@ -43,7 +43,7 @@ class Clock:
             if not present.any():
                 raise RecordingError(
                     f"{self._file.path.name}: no time stamp in the first {len(stamps)} records; "
-                    "mend 'column' of 'time' in the sensor file, or drop 'time' and state 'rate'"
+                    "correct 'column' of 'time' in the sensor file, or drop 'time' and state 'rate'"
                 )
             self.first = stamps[present.argmax()]
             self._file.started = self._started(self.first) or self._file.started

@@ -45,7 +45,7 @@ class TextLog(AbstractContextManager["TextLog"]):
             if time.unit is None or time.unit == "samples" or time.wraps is not None:
                 raise ConfigError(
                     "a simulated log needs numeric time stamps in s, ms, us or ns that never wrap; "
-                    "mend 'unit' of 'time' in the sensor file, and drop 'format' and 'wraps'"
+                    "correct 'unit' of 'time' in the sensor file, and drop 'format' and 'wraps'"
                 )
             self._stamp_unit = SECONDS[time.unit] * time.scale
             placed[time.column] = "time"

@@ -49,10 +49,11 @@ class Recording:
 
     @property
     def inputs(self) -> list[Path]:
-        """Files whose date decides whether Snakemake reads the recording again.
+        """Input files for Snakemake; their dates decide whether it reads the recording again.
 
-        Changes of logs and notes show in the settings of the ingest instead. A recording that is
-        held back has an input that does not exist: Snakemake leaves its results as they are.
+        A simulated recording has its files. Any other has none: changes of its logs and notes show
+        in the settings of the ingest. A recording that is held back has a file that does not exist,
+        so that Snakemake leaves its results as they are.
         """
         if self.held_back:
             return [self.path / "held back"]

@@ -209,7 +209,7 @@ def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
 def find_static_recordings(
     folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[tuple[RecordingRow, Path]]:
-    """Return the usable static recordings in ``folders``, by ``far`` (False first), then length."""
+    """Return usable static recordings, sorted by ``far`` (False first), then the longest first."""
 
     def order(recording: tuple[RecordingRow, Path]) -> tuple[Any, ...]:
         row = recording[0]

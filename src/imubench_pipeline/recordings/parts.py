@@ -135,7 +135,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     if part.rows == 0:
         raise RecordingError(
             f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
-            f"(use: start {use.start} s, end {use.end or 'open'}); mend 'use' in the notes"
+            f"(use: start {use.start} s, end {use.end or 'open'}); correct 'use' in the notes"
         )
     if not_used:
         file.note(NotUsed(file.path.name, not_used), not_used, "note")

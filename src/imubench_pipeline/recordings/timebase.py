@@ -86,12 +86,12 @@ def fit_time_base(
     """
     typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
-        raise RecordingError("the time stamps do not advance; mend 'column' of 'time'")
+        raise RecordingError("the time stamps do not advance; correct 'column' of 'time'")
     interval = typical.mean
     if not _MIN_INTERVAL <= interval <= _MAX_INTERVAL:
         raise RecordingError(
-            f"the time stamps are {interval:.3g} s apart; mend 'unit' of 'time' in the sensor file "
-            "(s, ms, us or ns)"
+            f"the time stamps are {interval:.3g} s apart; correct 'unit' of 'time' in the sensor "
+            "file (s, ms, us or ns)"
         )
     if typical.other is not None and _is_rate_of(stated, typical.other, settings):
         interval = typical.other
@@ -103,7 +103,7 @@ def fit_time_base(
     if track.grid > _MAX_EXTRA_POINTS + _MAX_MISSING_PER_SAMPLE * track.rows:
         raise RecordingError(
             f"only {track.rows} of {track.grid} samples at {1.0 / interval:.6g} Hz are present; "
-            f"expected at least 1 in {_MAX_MISSING_PER_SAMPLE}: mend 'unit' of 'time' in the "
+            f"expected at least 1 in {_MAX_MISSING_PER_SAMPLE}: correct 'unit' of 'time' in the "
             "sensor file, or split the log at its gaps"
         )
     # Many holes with more points than the log has records are pauses of the host, not losses.
@@ -238,8 +238,8 @@ def _check_segments(number: int) -> None:
     if number > _MAX_SEGMENTS:
         raise RecordingError(
             f"the time stamps jump or stop so often that there are {number} segments; expected at "
-            f"most {_MAX_SEGMENTS}: mend 'column' of 'time' in the sensor file, state 'wraps' if "
-            "the stamps return to 0, or split the log at its pauses"
+            f"most {_MAX_SEGMENTS}: correct 'column' of 'time' in the sensor file, state 'wraps' "
+            "if the stamps return to 0, or split the log at its pauses"
         )
 
 
@@ -313,7 +313,7 @@ def _assume_consecutive(
         rows += len(block)
         last = latest[-1]
     if groups.elapsed <= 0:
-        raise RecordingError("the time stamps do not advance; mend 'column' of 'time'")
+        raise RecordingError("the time stamps do not advance; correct 'column' of 'time'")
     _check_segments(len(starts))
     rate, others = groups.rate()
     at_worst = worst_at / rate

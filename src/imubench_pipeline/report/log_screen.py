@@ -62,7 +62,7 @@ class Event:
         return tuple(dict.fromkeys(row.channel for row in self.findings if row.channel))
 
     def factors(self) -> dict[str, float] | None:
-        """Return the factor by which each parameter changes if the event remains, or None."""
+        """Return the factor on each parameter if no signal is removed; None if not known."""
         largest: dict[str, float] = {}
         measured = False
         for row in self.findings:

@@ -79,8 +79,8 @@ def find_snakefile(folder: Path) -> Path:
     shipped = find_project() / "Snakefile"
     if not (folder / "config/config.yaml").is_file():
         raise ConfigError(
-            f"{folder}: found no config/config.yaml and no Snakefile; expected a checkout, or a "
-            f"folder of logs: make one with imubench init {folder}"
+            f"{folder}: found no config/config.yaml and no Snakefile; expected a checkout of "
+            f"imubench, or a folder of logs: make a folder of logs with imubench init {folder}"
         )
     if not shipped.is_file():
         raise ConfigError(

@@ -16,7 +16,10 @@ _MAX_NAMES = 200  # in a pattern: matching more takes longer than the jobs that 
 
 @contextlib.contextmanager
 def seal_outputs(job: Job) -> Iterator[None]:
-    """Seal a job's outputs and inputs after the block, unless this fails, or results is None."""
+    """Seal a job's outputs after the block, with digests of its inputs from before the block.
+
+    Nothing is sealed if the block fails, or if ``job.results`` is None.
+    """
     if job.results is None:
         yield
         return

@@ -17,8 +17,7 @@ def main() -> int:
     if os.name != "posix":
         print(
             f"imubench: found the platform {sys.platform}; expected Linux, as it forks processes "
-            "and locks files; to mend: on Windows, install and run it in WSL, which `wsl "
-            "--install` sets up",
+            "and locks files; on Windows, install and run it in WSL, which `wsl --install` sets up",
             file=sys.stderr,
         )
         return 2

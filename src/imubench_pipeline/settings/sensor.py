@@ -104,7 +104,8 @@ class TimeSource(validation.Strict):
     def _one_way(self) -> Self:
         if (self.unit is None) == (self.format is None):
             raise ValueError(
-                "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
+                "expected exactly one of 'unit' (s, ms, us, ns, samples) and 'format' (iso8601, or "
+                "a pattern such as %d.%m.%Y %H:%M:%S)"
             )
         for column in (self.column, self.date):
             if isinstance(column, int) and column < 1:
@@ -276,7 +277,7 @@ class UsedPart(validation.Strict):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.end is not None and self.end <= self.start:
-            raise ValueError(f"end {self.end} s is not after start {self.start} s; mend one")
+            raise ValueError(f"end {self.end} s is not after start {self.start} s; correct one")
         return self
 
 

@@ -129,7 +129,7 @@ class OfASensor(ImuSettings):
         if not 0.5 < length <= _MAX_SAMPLES:
             content = "no sample" if length < 1.0 else f"more than {_MAX_SAMPLES:g} samples"
             raise ValueError(
-                f"duration: {self.duration} at {self.rate} gives {content}; mend one of them"
+                f"duration: {self.duration} at {self.rate} gives {content}; correct one of them"
             )
         check_axes(self.channels, "channels")
         return self

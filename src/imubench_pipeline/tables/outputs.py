@@ -247,7 +247,7 @@ _MENDED = {
 
 
 def explain(error: OSError) -> str:
-    """Return the reason of an error of the file system, and how to mend it, as one line."""
+    """Return the reason of an error of the file system, and how to correct it, as one line."""
     mended = _MENDED.get(error.errno or 0, "choose another place")
     return f"{escape_invisible(error.strerror or str(error))}; {mended}"
 

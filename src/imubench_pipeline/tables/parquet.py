@@ -48,7 +48,10 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
     footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
-        raise RuntimeError(f"{path}: no digest in the metadata; use a tested version of pyarrow")
+        raise RuntimeError(
+            f"{path}: no digest in the metadata; use a tested version of pyarrow, such as the one "
+            "in constraints.txt"
+        )
     with path.open("r+b") as file:
         file.seek(place.start(1) - len(footer), 2)
         file.write(hashlib.sha256(footer).hexdigest().encode())

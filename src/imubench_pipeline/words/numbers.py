@@ -67,7 +67,7 @@ def join_first(texts: Sequence[str], most: int) -> str:
 
 
 def digit_limits(parameter: str = "") -> tuple[int, int]:
-    """Return the minimum and maximum digits of a parameter, or by default of any value."""
+    """Return the least and greatest number of significant digits; by default, of any parameter."""
     return DIGITS.get(parameter) or DIGITS["default"]
 
 

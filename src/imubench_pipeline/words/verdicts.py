@@ -277,7 +277,7 @@ def source_text(
     *,
     sized: bool = True,
 ) -> str:
-    """Return a source of an error: ``gyro N``; ``sized``: with its time or frequency."""
+    """Return the name of an error source, such as ``gyro N``; ``sized``: with T_B or frequency."""
     size = f" {source.T_B:.4g} s" if sized and source.T_B is not None else ""
     size += f" {source.frequency:.4g} Hz" if sized and source.frequency is not None else ""
     sensor = f"{source.quantity} " if source.quantity else ""

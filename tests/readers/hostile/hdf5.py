@@ -115,7 +115,9 @@ def one_unit_for_all(folder: Path) -> Path:
 HDF5 = {
     "one unit of 10 MB for 300": Attack(one_unit_for_all, "^read: 100$", "^listed: "),
     "names that clear a terminal": Attack(
-        hdf5(long_names), "no variable or column 'wx' .*; the file has .*; mend 'column'", "^listed"
+        hdf5(long_names),
+        "no variable or column 'wx' .*; the file has .*; correct 'column'",
+        "^listed",
     ),
     "20000 links": Attack(hdf5(links), "more than 20000 objects"),
     "5000 groups deep": Attack(hdf5(deep_groups), "groups are nested 65 deep"),

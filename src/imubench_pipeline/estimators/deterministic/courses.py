@@ -28,7 +28,7 @@ _DELTA_LOG_LIKELIHOOD_95 = 1.92
 
 @dataclass(frozen=True)
 class DeterministicSignal:
-    """A deterministic signal in a log, with its size and interval."""
+    """A deterministic signal in a log, with its size, start and end."""
 
     kind: Kind
     start: float

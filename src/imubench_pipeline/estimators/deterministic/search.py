@@ -49,7 +49,7 @@ class Score:
 
 
 class Gain:
-    """Computes the gain of log likelihood by one more regressor in a part, for given noise."""
+    """Computes twice the log likelihood that one more regressor adds in a part, by ``density``."""
 
     def __init__(
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int

@@ -190,7 +190,10 @@ def compute_root_mean_square(of_runs: Array) -> Interval:
 
 
 def compute_ratio(of_runs: Array, others: Array) -> Interval:
-    """Return the ratio of two rms errors with limits, from mean squares of runs, shapes (R,)."""
+    """Return the ratio of two rms errors, with limits, from the mean squares of each run, (R,).
+
+    The numerator is from ``of_runs``; ``others`` has the same unit.
+    """
     square = float(of_runs.mean() / others.mean())
     return _compute_interval(math.sqrt(square), (of_runs - square * others) / of_runs.mean())
 

@@ -45,7 +45,7 @@ _MIN_SCATTER_P_VALUE = 0.01  # below it the scatter of the means contradicts the
 
 
 def summarise_calibration(rows: Sequence[CalibrationRow], system: System) -> str:
-    """Return scale factor and bias of a recording in a sentence, or the reason without them."""
+    """Return sentences with scale factor and bias of a recording, or the reason for no result."""
     by_parameter = {row.parameter: row for row in rows}
     bias = by_parameter.get("bias")
     if bias is None:

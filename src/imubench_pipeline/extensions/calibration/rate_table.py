@@ -217,7 +217,7 @@ class Residuals:
 
     @property
     def value(self) -> Array:
-        """Mean less line, rad/s, shape (k,)."""
+        """The residuals: mean reading minus value of the line, rad/s, shape (k,)."""
         return self.mean - self.line
 
 

@@ -97,7 +97,7 @@ class Schedule:
 
     @property
     def experiment(self) -> Experiment:
-        """The stretches as dwells, for block means; the latitude is not used."""
+        """The stretches as dwells, for block means; the latitude is 0, and not used."""
         return Experiment(tuple(self.stretches), self.rate, 0.0)
 
     def of_blocks(self, blocks: Blocks) -> Array:

@@ -233,7 +233,8 @@ class InPositions(Turned):
         missing = [name for name in CHANNELS if name not in channels]
         if missing:
             raise ValueError(
-                f"the log has no {', '.join(missing)}; expected three gyros and accelerometers"
+                f"the log has no {', '.join(missing)}; expected three gyros and three "
+                "accelerometers"
             )
 
 

@@ -28,7 +28,7 @@ UNINFORMATIVE_SIGMA = 1.0  # of a prior, rad/s: 14,000 times the Earth's rate
 
 @dataclass(frozen=True)
 class Step:
-    """Transition from the states after a block to the next block: its mean, and states after it."""
+    """Transition to the states after the next block, and to the mean of that block."""
 
     transition: Array  # shape (m + 1, m); the last row gives the mean of the block
     factor: Array  # shape (m + 1, m + 1); a root of the covariance of the noise
@@ -152,7 +152,7 @@ class BlockFilter:
             root = self.roots[k] = after[a:, a:]
 
     def matrices(self, block: int) -> tuple[Array, Array]:
-        """Return the transition into a block, (n, n), and a root of its noise, (n, r)."""
+        """Return the transition into a block, (n, n), and a root of the noise covariance (n, r)."""
         return self._matrices[self._which[block]]
 
     def run(self, means: Array) -> tuple[Array, Array]:

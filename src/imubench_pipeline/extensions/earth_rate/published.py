@@ -81,11 +81,11 @@ def estimate_courses(
     papers: NoiseModel,
     turn_on_bias: float | None = None,
 ) -> Courses:
-    """Estimate the Earth's rate by every method; ``papers`` is the model for Silva et al.
+    """Estimate the Earth's rate by every method; ``papers``: model for the filter of Silva et al.
 
     The log, shape (n,), is in rad/s, NaN where a sample is missing; the turn-on bias is a standard
-    deviation, rad/s (None: unknown). Raises ValueError if the dwells are all of one sense, or
-    empty.
+    deviation, rad/s (None: unknown). Raises ValueError if there are no dwells, or if all have the
+    same sense (one position only).
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
         raise ValueError("all dwells have one position: rate and bias cannot be separated")

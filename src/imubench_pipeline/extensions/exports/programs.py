@@ -146,9 +146,10 @@ def declare(
     family: Family = "N+K",
     **more: Any,
 ) -> Program:
-    """Return a program; each row has a `Form` and the names of the gyro and accelerometer number.
+    """Return a program, with a row for each kind of number.
 
-    Units of both may follow; SI by default. With None as second name, both share one number.
+    A row is a `Form`, the names of the gyro's and the accelerometer's number, and optionally the
+    unit of each (default SI). If the second name is None, one number serves both.
     """
     made = []
     for form, gyro, accel, *units in rows:

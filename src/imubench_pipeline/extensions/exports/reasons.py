@@ -65,7 +65,7 @@ def channel_in_use(
 
 
 def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
-    """Return a note on a log in use; ``channels``: sentence of each, ``cutoff`` in Hz."""
+    """Return a note on noise above ``cutoff``, Hz, in use; ``channels``: a text for each one."""
     at = number_text(cutoff)
     return (
         f"IN USE: at least the broadband noise above {at} Hz of a log in use. Below {at} Hz all is "

@@ -137,7 +137,7 @@ class NovatelFile(LogFile):
         if not set(columns.values()) <= _COLUMNS.keys() or of_time != TIME:
             raise RecordingError(
                 f"{self.path.name}: no columns {', '.join([*columns.values(), of_time])} in a log "
-                f"of RAWIMU; expected {', '.join(_COLUMNS)}, and {TIME} in ns as 'time'; mend "
+                f"of RAWIMU; expected {', '.join(_COLUMNS)}, and {TIME} in ns as 'time'; correct "
                 "'column' in the sensor file"
             )
         logs, clock = _Logs(stamped=time is not None), Clock(self, None, lambda _: None)

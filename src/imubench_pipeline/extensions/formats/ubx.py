@@ -67,7 +67,7 @@ class UbxFile(LogFile):
             if source.column not in COLUMNS:
                 raise RecordingError(
                     f"{self.path.name}: no column {source.column!r} for {name}; a UBX log has "
-                    f"{', '.join(COLUMNS)}; mend 'column' of {name} in the sensor file"
+                    f"{', '.join(COLUMNS)}; correct 'column' of {name} in the sensor file"
                 )
         kind = self._kind()
         self._check_time(kind)
@@ -112,7 +112,7 @@ class UbxFile(LogFile):
         if time.column not in columns:
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
-                f"{' and '.join(columns)}; mend 'column' of 'time' in the sensor file"
+                f"{' and '.join(columns)}; correct 'column' of 'time' in the sensor file"
             )
         in_ms = kind == ESF_RAW and time.column == "time_tag"
         if time.format is not None or (in_ms and time.unit != "ms"):
@@ -157,7 +157,7 @@ class UbxFile(LogFile):
             f"{frames.right.total()} UBX messages (class and id {frames.kinds()}), "
             f"{frames.wrong.total()} with a wrong checksum; expected the data types of "
             f"{_describe_types(self._columns())}; switch ESF-RAW or ESF-MEAS on in the "
-            "receiver, or mend 'column' in the sensor file"
+            "receiver, or correct 'column' in the sensor file"
         )
 
     def _is_clear(self, frames: Frames, words: "dict[bytes, Words]") -> bool:
@@ -173,7 +173,7 @@ class UbxFile(LogFile):
             raise RecordingError(
                 f"{self.path.name}: found {frames.right[kind]} {name} messages with data types "
                 f"{words.types() or 'none'}, {frames.wrong[kind]} with a wrong checksum; expected "
-                f"{_describe_types(absent)}; mend 'column' or 'variable' in the sensor file"
+                f"{_describe_types(absent)}; correct 'column' or 'variable' in the sensor file"
             )
         if wrong := frames.wrong[kind]:
             data = WrongChecksum(

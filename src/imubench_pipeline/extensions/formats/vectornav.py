@@ -179,7 +179,7 @@ def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         if len(rest) > BLOCK_BYTES:
             raise RecordingError(
                 f"{path.name}: no line break in {BLOCK_BYTES} bytes; expected the text of a "
-                "VectorNav sensor: mend 'reader' in the sensor file, or copy the file again"
+                "VectorNav sensor: correct 'reader' in the sensor file, or copy the file again"
             )
         yield text[:cut]
     body, _, check = rest.rpartition(b"$")[2].rpartition(b"*")
@@ -267,7 +267,7 @@ class VectorNavFile(LogFile):
             raise RecordingError(
                 f"{self.path.name}: no time column {stated.column!r}; a VectorNav log has "
                 f"{HOST_TIME!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
-                "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
+                "the end; correct 'column' of 'time', or drop 'time' and state 'rate'"
             )
         kind = self._kind()
         records = Sentences(kind, self.log.time is not None)
@@ -290,7 +290,7 @@ class VectorNavFile(LogFile):
                     raise RecordingError(
                         f"{self.path.name}: no stamp that can be read in the first {len(rows)} "
                         f"sentences; expected {where}, found {before.decode('ascii', 'replace')!r} "
-                        f"before {body.decode('ascii', 'replace')!r}; mend 'time' in the sensor "
+                        f"before {body.decode('ascii', 'replace')!r}; correct 'time' in the sensor "
                         "file, or drop it and state 'rate'"
                     )
                 time = clock.seconds(stamps, ~missing)
@@ -304,8 +304,8 @@ class VectorNavFile(LogFile):
         if not records.right:
             raise RecordingError(
                 f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
-                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; mend 'column' in the "
-                "sensor file, or switch the checksum on (register 30)"
+                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; correct 'column' in "
+                "the sensor file, or switch the checksum on (register 30)"
             )
         records.report(self, f"${kind}", len(FIELDS[kind]))
 
@@ -317,7 +317,7 @@ class VectorNavFile(LogFile):
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
                 f"{self.path.name}: no VectorNav sentence has all of the columns {named}; expected "
-                f"columns of one sentence, {expected}; mend 'column' in the sensor file"
+                f"columns of one sentence, {expected}; correct 'column' in the sensor file"
             )
         if len(able) == 1:
             return able[0]
@@ -335,7 +335,7 @@ class VectorNavFile(LogFile):
         if not both:
             raise RecordingError(
                 f"{self.path.name}: found {seen}; expected one of {', '.join(able)}, each with "
-                "a checksum of 2 or 4 digits; mend 'column' in the sensor file, or set the "
+                "a checksum of 2 or 4 digits; correct 'column' in the sensor file, or set the "
                 "output of the device (registers 6 and 30)"
             )
         raise RecordingError(

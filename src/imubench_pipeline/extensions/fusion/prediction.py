@@ -36,9 +36,10 @@ class FusedCurve:
 def fused_allan(board: Board, weights: Array, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
-    It is the sum of w_i^2 AV_i over the sensors, with weights w and Allan variances AV, and of
-    (w^T g)^2 AV over shared processes, with sensitivities g. ``tau``, s, shape (m,), is rounded to
-    whole fused samples. The weights have the shape (n,) and the sum 1, or ValueError.
+    It has two parts: the sum of w_i^2 AV_i over the sensors, and the sum of (w^T g)^2 AV over the
+    shared processes. Here w are the weights, AV Allan variances, and g the sensitivities to a
+    process. ``tau``, s, shape (m,), is rounded to whole fused samples. Raises ValueError unless the
+    weights have the shape (n,) and the sum 1.
     """
     board.check_weights(weights)
     alone, common = board.allan_parts(tau).of_sum(weights)

@@ -26,4 +26,7 @@ class Specimens(SimulatedSensors):
             other = [key for key in ("R", "Q", "further", "sinusoids") if getattr(axis, key)]
             if axis.N is None or other:
                 found = f"{other[0]} in it" if other else "no N in it"
-                raise ValueError(f"channels.{name} has {found}; expected N, and perhaps B and K")
+                raise ValueError(
+                    f"channels.{name} has {found}; expected N, optionally B and K, and no other "
+                    "term"
+                )

@@ -140,7 +140,10 @@ def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
 
 @cache
 def simulate_readings(channel: Channel) -> dict[str, Range]:
-    """Return parameters read from curves of logs of Table 2 (N at 1 s, K at a ninth of a log)."""
+    """Return 5, 50 and 95 % quantiles of N, B, K and T_B read from curves of logs of Table 2.
+
+    N is read at 1 s, and K at a ninth of a log.
+    """
     tau = choose_cluster_sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {

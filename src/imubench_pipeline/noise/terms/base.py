@@ -174,7 +174,8 @@ class Term(ABC):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """Return the variance of its integrated error (`noise.growth`), without the turn-on bias.
 
-        ``order`` is m, 0 to 2; ``time`` is t, s, above 0. The unit is (rad/s)^2 or (m/s^2)^2 times
+        ``order`` is m, 0 to 2; ``time`` is t, s, above 0. W is the static window of ``start``, A
+        its time since switch-on, s; c is t^(m+1) / (m+1)!. The unit is (rad/s)^2 or (m/s^2)^2 times
         s^(2m+2).
         """
 

@@ -114,7 +114,10 @@ class Flicker(Term):
         return self.B**2, Flicker(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return B^2 t^(2m+2) times `integrate_after_window` or `integrate_since_switch_on`."""
+        """Return B^2 t^(2m+2) times `integrate_after_window` or `integrate_since_switch_on`.
+
+        It is the variance of the integrated error; m is ``order``, and t is ``time``.
+        """
         scale = self.B**2 * time ** (2 * order + 2)
         if isinstance(start, Calibrated):
             return scale * integrate_after_window(order, start.window / time)

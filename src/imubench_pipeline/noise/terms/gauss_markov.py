@@ -119,9 +119,10 @@ class GaussMarkov(base.Term):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """Return S_B (T_B^(2m+3) P_m(x) + c^2 T_B (P_0(y) / y^2 + (d_x - d_y)^2 / 2)).
 
-        x = t/T_B, y = W/T_B; with E_k(x) = x^k phi_k(-x) (`exponentials.evaluate_phi`) P_m(x) is
-        the integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
-        d_y = y phi_2(-y) are the decay of the state at the start, forward and backward.
+        It is the variance of the integrated error. m is ``order``, t ``time``, W the static window,
+        c = t^(m+1) / (m+1)!, x = t/T_B, and y = W/T_B. P_m(x) is the integral of E_{m+1}^2 from 0
+        to x, with E_k(x) = x^k phi_k(-x) (`exponentials.evaluate_phi`). The decay of the state at
+        the start is d_x = (m+1)! x phi_{m+2}(-x) forward, and d_y = y phi_2(-y) backward.
         Uncalibrated, it is S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
         x, constant = time / self.T_B, of_constant(order, time)

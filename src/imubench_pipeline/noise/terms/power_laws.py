@@ -73,8 +73,9 @@ class Quantization(base.Term):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """Return Q^2 ([m = 0] + (t^m/m! + c/W)^2 + (c/W)^2); uncalibrated, without c/W.
 
-        [m = 0] is 1 for m = 0, else 0. The roundings between the ends are left out: for m > 0 they
-        add about the fraction 1 / (number of samples).
+        It is the variance of the integrated error. m is ``order``, t ``time``, W the static window,
+        and c = t^(m+1) / (m+1)!; [m = 0] is 1 for m = 0, else 0. The roundings between the ends are
+        left out: for m > 0 they add about the fraction 1 / (number of samples).
         """
         # The rounding at the start ends the window and begins the motion.
         first = time**order / math.factorial(order)
@@ -152,7 +153,11 @@ class WhiteNoise(base.Term):
         return self.N**2, WhiteNoise(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2/W) (Groves, 2013); uncalibrated, no c^2/W."""
+        """Return N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2/W) (Groves, 2013); uncalibrated, no c^2/W.
+
+        It is the variance of the integrated error. m is ``order``, t ``time``, W the static window,
+        and c = t^(m+1) / (m+1)!.
+        """
         return self.N**2 * (of_white(order, time) + of_white_mean(order, time, start))
 
     def sources(
@@ -236,7 +241,11 @@ class RandomWalk(base.Term):
         return self.K**2, RandomWalk(1.0)
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3); uncalibrated, A replaces W/3."""
+        """Return K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3); uncalibrated, A replaces W/3.
+
+        It is the variance of the integrated error. m is ``order``, t ``time``, W the static window,
+        A the time since switch-on, and c = t^(m+1) / (m+1)!.
+        """
         lag = start.window / 3.0 if isinstance(start, Calibrated) else start.on_time
         return self.K**2 * (of_white(order + 1, time) + of_constant(order, time) ** 2 * lag)
 
@@ -307,7 +316,11 @@ class Ramp(base.Deterministic):
         return ContinuousSpace(F, np.zeros((2, 2)), np.array([1.0, 0.0]))
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return R^2 (t^(m+2) / (m+2)! + c W/2)^2; uncalibrated, A replaces W/2."""
+        """Return R^2 (t^(m+2) / (m+2)! + c W/2)^2; uncalibrated, A replaces W/2.
+
+        It is the squared integrated error. m is ``order``, t ``time``, W the static window, A the
+        time since switch-on, and c = t^(m+1) / (m+1)!.
+        """
         lag = start.window / 2.0 if isinstance(start, Calibrated) else start.on_time
         rise = of_constant(order + 1, time) + of_constant(order, time) * lag
         return (self.R * rise) ** 2

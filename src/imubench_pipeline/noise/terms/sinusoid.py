@@ -69,7 +69,9 @@ class Sinusoid(Deterministic):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """Return A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with w = 2 pi f_0.
 
-        A is the amplitude; the phase is random. Uncalibrated, phi_1(-i w W) is absent.
+        It is the variance of the integrated error. A is the amplitude, m ``order``, t ``time``, W
+        the static window, and c = t^(m+1) / (m+1)!; phi is `evaluate_phi`; the phase is random.
+        Uncalibrated, the term phi_1(-i w W) is absent.
         """
         omega = 2.0 * math.pi * self.frequency
         constant, x = of_constant(order, time), omega * time

@@ -47,8 +47,8 @@ class ArrowFile(ArrayFile):
                 "write it with pyarrow.feather.write_feather"
             )
         raise UnusableError(
-            "not a Parquet, Feather or Arrow file, or its beginning is damaged; mend 'reader' in "
-            "the sensor file, or copy the file again"
+            "not a Parquet, Feather or Arrow file, or its beginning is damaged; correct 'reader' "
+            "in the sensor file, or copy the file again"
         )
 
 

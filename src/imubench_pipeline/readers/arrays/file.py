@@ -101,7 +101,9 @@ class ArrayFile(LogFile):
             )
         if 0 in lengths.values():
             names = join_first(table.shown for table in tables)
-            raise UnusableError(f"no record in {names}; expected at least one")
+            raise UnusableError(
+                f"no rows in {names}; expected at least one: the log is empty, record it again"
+            )
         wanted = {
             table: sorted({position for owner, position in places.values() if owner is table})
             for table in tables
@@ -265,12 +267,12 @@ def _find_column(
         table = _find_table(tables, variable, key)
         has = join_first(table.labels) or f"{table.width} columns without names: give a number"
         raise UnusableError(
-            f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
-            f"{name_settings_file(key)}"
+            f"no column {column!r} for {key}; {table.shown} has {has}; correct 'column' of {key} "
+            f"in {name_settings_file(key)}"
         )
     raise UnusableError(
         f"no variable or column {column!r} for {key}; the file has "
-        f"{_describe_contents(tables, labels=True)}; mend 'column' of {key} in "
+        f"{_describe_contents(tables, labels=True)}; correct 'column' of {key} in "
         f"{name_settings_file(key)}"
     )
 
@@ -302,8 +304,8 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
                 "drop 'variable:'"
             )
         raise UnusableError(
-            f"no variable {variable!r} for {key}; the file has {_describe_contents(tables)}; mend "
-            f"'variable' of {key} in {name_settings_file(key)}"
+            f"no variable {variable!r} for {key}; the file has {_describe_contents(tables)}; "
+            f"correct 'variable' of {key} in {name_settings_file(key)}"
         )
     usable = [table for table in tables.values() if table.fault is None]
     # Single values, such as the rate, are not counted.
@@ -328,7 +330,7 @@ def _take_numbered(table: Table, column: int, key: str) -> _Place:
         names = f" ({join_first(table.labels)})" if table.labels else ""
         raise UnusableError(
             f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
-            f"{names}; mend 'column' of {key} in {name_settings_file(key)}"
+            f"{names}; correct 'column' of {key} in {name_settings_file(key)}"
         )
     return table, column - 1
 
@@ -505,7 +507,7 @@ class ArrayTime:
             if np.any(~missing & ((whole > limit) | (whole < -limit))):
                 raise UnusableError(
                     "time stamps are dates before 1678 or after 2262, expected the time of a log; "
-                    "mend 'column' of 'time' in the sensor file, or copy the file again"
+                    "correct 'column' of 'time' in the sensor file, or copy the file again"
                 )
             stamps = np.where(missing, 0, whole) * np.int64(factor)
         elif values.dtype.kind == "f":

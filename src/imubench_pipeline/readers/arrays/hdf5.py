@@ -34,8 +34,8 @@ class Hdf5File(ArrayFile):
         """Return a table for each data set (see `ArrayFile.tables`)."""
         if not h5py.is_hdf5(self.path):
             raise UnusableError(
-                "not an HDF5 file, or its beginning is damaged; mend 'reader' in the sensor file, "
-                "or copy the file again"
+                "not an HDF5 file, or its beginning is damaged; correct 'reader' in the sensor "
+                "file, or copy the file again"
             )
         return list_data_sets(stack.enter_context(h5py.File(self.path, "r")))
 

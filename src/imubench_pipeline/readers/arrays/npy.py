@@ -38,7 +38,7 @@ class NumpyFile(ArrayFile):
         if not begin.startswith(b"PK"):
             raise table.UnusableError(
                 "not a NumPy file, or its beginning is damaged; expected the output of numpy.save "
-                "or numpy.savez: mend 'reader' in the sensor file, or copy the file again"
+                "or numpy.savez: correct 'reader' in the sensor file, or copy the file again"
             )
         archive = stack.enter_context(open_archive(self.path))
         size = self.path.stat().st_size

@@ -64,7 +64,7 @@ class CsvFile(LogFile):
             if time is not None and at in time.types:
                 raise RecordingError(
                     f"{self.path.name}: column {layout.names[at]!r} is used both for time and for "
-                    f"{name}; mend 'column' of one of them in the sensor file"
+                    f"{name}; correct 'column' of one of them in the sensor file"
                 )
         yield from self._batches(layout, columns, time)
 

@@ -61,14 +61,14 @@ class TextLayout:
             if column > len(self.names):
                 raise RecordingError(
                     f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
-                    f"({present}) with delimiter {self.split}; mend 'column' of {key}, or "
+                    f"({present}) with delimiter {self.split}; correct 'column' of {key}, or "
                     f"'delimiter', in {name_settings_file(key)}"
                 )
             return column - 1
         if column not in self.names:
             raise RecordingError(
                 f"{self.file}: no column {column!r} for {key}; found {present} with delimiter "
-                f"{self.split}; mend 'column' of {key} in {name_settings_file(key)}"
+                f"{self.split}; correct 'column' of {key} in {name_settings_file(key)}"
             )
         if self.names.count(column) > 1:
             raise RecordingError(
@@ -163,7 +163,7 @@ class _Search:
         comments, lines = self._parted(split)
         if not lines:
             raise RecordingError(
-                f"{self._file}: no record after the comments; mend 'comment' in the sensor file"
+                f"{self._file}: no record after the comments; correct 'comment' in the sensor file"
             )
         header, first = self._header_and_first(split, comments, lines)
         for line in lines[: first + 1]:
@@ -176,7 +176,7 @@ class _Search:
         if len(names) > MAX_COLUMNS:
             raise RecordingError(
                 f"{self._file}, line {record.number}: more than {MAX_COLUMNS} columns with "
-                f"delimiter {split}; expected one record per line: write the log again, or mend "
+                f"delimiter {split}; expected one record per line: write the log again, or correct "
                 "'delimiter' in the sensor file"
             )
         passed_over = self._passed_over(split, header, lines[:first])
@@ -246,7 +246,7 @@ class _Search:
         if not lines and (number > bounds.MAX_LINES_BEFORE or start > bounds.MAX_BYTES_BEFORE):
             raise RecordingError(
                 f"{self._file}: no record in the first {number} lines, which are blank or "
-                "comments; expected some: mend 'comment' in the sensor file"
+                "comments; expected some: correct 'comment' in the sensor file"
             )
         return list(comments), lines
 

@@ -40,11 +40,11 @@ number of levels, which a drift increases, does not matter."""
 def estimate_excess_repeats(column: summary.ColumnSummary) -> tuple[float, float]:
     """Return the shares of samples that repeat beyond chance, and of pairs that repeat by chance.
 
-    A register that is read faster than it is updated repeats samples, and between the repeats it
-    changes like independent samples. By chance, samples repeat for two reasons; the larger share is
-    subtracted. Coarse steps: the share of samples that equal the sample `summary.FAR_LAG` before.
-    Low-passed noise: the share of repeats in rounded normal noise with the same share of one-step
-    changes.
+    A register that is read faster than it is updated repeats samples. Between the repeats it
+    changes like independent samples. Samples also repeat by chance; the larger of two estimates of
+    this share is removed. For coarse steps, it is the share of samples that equal the sample
+    `summary.FAR_LAG` before. For low-passed noise, it is the share of repeats in rounded normal
+    noise whose changes are of one step equally often.
     """
     pairs, far_pairs = column.pairs, column.far_pairs
     if pairs == 0 or far_pairs == 0:

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     if not (folder / FOLDER).is_dir():
         print(
             f"{folder}/{FOLDER}: expected the seals of the steps, found none: the results are of "
-            "an older version, or their seals were removed; to mend: "
+            "an older version, or their seals were removed; to correct it: "
             f"{Results(folder).run_again}, which makes everything again"
         )
         return 1
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     with show_progress(results.size, f"of {results.size / 1e9:.2f} GB read") as results.read:
         for fault in results.faults():
             number += 1
-            line = f"{folder / fault.path}: {fault.found}; to mend: {fault.mend}"
+            line = f"{folder / fault.path}: {fault.found}; to correct it: {fault.mend}"
             print(escape_invisible(line), flush=True)
     for line in describe_drop_zone(folder):
         print(line)

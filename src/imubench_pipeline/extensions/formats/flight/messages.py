@@ -167,7 +167,7 @@ class MessageFile(LogFile):
         raise RecordingError(
             f"{self.path.name}: expected one kind of message with {', '.join(sorted(wanted))}"
             f"{' called ' * bool(stated)}{' and '.join(sorted(map(str, stated)))}; found "
-            f"{has or 'none'}; mend 'variable' or 'column' in the sensor file"
+            f"{has or 'none'}; correct 'variable' or 'column' in the sensor file"
         )
 
 

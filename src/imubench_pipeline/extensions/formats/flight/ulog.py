@@ -41,7 +41,7 @@ class UlogMessages(Messages):
         if not self._data.startswith(_MAGIC):
             raise RecordingError(
                 f"{self.file}: is no ULog: it begins with {self._data[:8].hex(' ')}; expected "
-                f"{_MAGIC.hex(' ')}; mend 'reader' in the sensor file, or copy the file again"
+                f"{_MAGIC.hex(' ')}; correct 'reader' in the sensor file, or copy the file again"
             )
         self._at = _HEADER_BYTES
         declared: dict[str, str] = {}

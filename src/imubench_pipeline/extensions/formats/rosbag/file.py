@@ -127,7 +127,7 @@ class RosbagFile(LogFile):
         if time is not None and time.column not in (HEADER_STAMP, LOG_TIME):
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; a ROS bag has {HEADER_STAMP!r} "
-                f"and {LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+                f"and {LOG_TIME!r}; correct 'column' of 'time' in the sensor file"
             )
         if time is not None and time.unit != "ns":
             raise RecordingError(
@@ -235,7 +235,7 @@ class RosbagFile(LogFile):
         expected = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
         raise RecordingError(
             f"{self.path.name}: no topic {name + ' ' if name else ''}with {wanted}; found "
-            f"{present or 'none'}{cut}; expected a topic of {expected}; mend 'variable' or "
+            f"{present or 'none'}{cut}; expected a topic of {expected}; correct 'variable' or "
             "'column' in the sensor file"
         )
 
@@ -270,7 +270,7 @@ def explain_errors(path: Path) -> Iterator[None]:
             reason = "a record promises more bytes than memory can hold"
         raise RecordingError(
             f"{path.name}: corrupt, or cut short ({reason or type(error).__name__}); "
-            "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
+            "expected a ROS bag; copy it again, or repair it ('ros2 bag reindex', 'mcap recover', "
             "'.recover' of sqlite3)"
         ) from None
 
@@ -308,7 +308,7 @@ def list_topics(path: Path, file_format: formats.FileFormat) -> list[formats.Log
         if not topics:
             raise RecordingError(
                 f"{path.name}: the bag has no topic that can be read; expected "
-                "sensor_msgs/Imu; 'rosbag reindex' may mend a damaged bag"
+                "sensor_msgs/Imu; 'rosbag reindex' may repair a damaged bag"
             )
         return [
             _describe_topic(file_format, source, topic, kind, counts.get(topic))

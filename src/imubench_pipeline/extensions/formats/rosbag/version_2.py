@@ -164,7 +164,7 @@ def check_database(path: Path) -> None:
     size = path.stat().st_size
     if header[24:28] == header[92:96] and size < expected:
         raise RecordingError(
-            f"{path.name}: cut short: {size} of {expected} bytes; copy it again, or mend it with "
+            f"{path.name}: cut short: {size} of {expected} bytes; copy it again, or repair it with "
             "'.recover' of sqlite3"
         )
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
