@@ -158,7 +158,7 @@ def match_variance(weights: Array) -> float:
 
 
 def match_lower_tail(weights: Array) -> float:
-    """Return chi-squared degrees of freedom with the lower 2.5 % tail (see `match_variance`)."""
+    """Return degrees of freedom that match the lower 2.5 % quantile of the `match_variance` sum."""
     if len(weights) == 1:
         return 1.0
     quantile = find_lower_quantile(weights, _LOWER_TAIL)
@@ -170,10 +170,10 @@ def match_lower_tail(weights: Array) -> float:
 
 
 def find_lower_quantile(weights: Array, chance: float) -> float:
-    """Return a lower quantile of a weighted sum of chi-squared variates, over the sum's mean.
+    """Return a lower quantile of a weighted sum of chi-squared variates, divided by its mean.
 
-    ``chance`` is the probability below it. The saddlepoint approximation has a relative error of
-    this probability below a tenth, for probabilities below a third. The error of the quantile is
+    ``chance`` is the probability below the quantile. The saddlepoint approximation gives this
+    probability within a tenth of it, if it is below a third. The error of the quantile is
     below 1 % if more than three weights are significant. A common factor of the weights w_i >= 0,
     shape (m,), has no effect. (R. Lugannani and S. Rice, "Saddle point approximation for the
     distribution of the sum of independent random variables", Adv. Appl. Probab. 12, 1980.)

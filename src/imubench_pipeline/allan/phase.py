@@ -39,9 +39,9 @@ def list_spans(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...
 class Gaps:
     """Numbers of missing samples of a log, by the length of their gap.
 
-    The mean of a cluster represents all of it if the missing samples are spread evenly over it, but
-    not if they are missing in one piece. Clusters are therefore compared with the usual share of
-    samples between gaps that are long for their size.
+    The mean of a cluster is valid if the missing samples are spread evenly over the cluster, but
+    not if they are in one long gap. The share of samples present in a cluster is therefore compared
+    with the share between long gaps (see `enough`).
     """
 
     samples: int  # points of the grid
@@ -196,7 +196,7 @@ def average_finite(samples: NDArray[np.floating[Any]]) -> float:
 
 @njit(cache=True, nogil=True)
 def accumulate(values: NDArray[np.floating[Any]], level: float, theta: Array) -> None:
-    """Set ``theta[1:]`` to ``theta[0]`` plus the cumulative sums of samples less a level."""
+    """Set ``theta[1:]`` to ``theta[0]`` plus the cumulative sums of ``values`` minus ``level``."""
     total = theta[0]
     for i in range(values.size):
         total += values[i] - level
@@ -244,7 +244,7 @@ def _sum_squares_twice(
 
 @njit(cache=True, nogil=True)
 def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
-    """Add the squared second differences from points ``start`` to ``stop`` to ``sums``, by size."""
+    """Add to ``sums``, by size, squared second differences that begin at ``start`` to ``stop``."""
     j = 0
     while j < sizes.size:
         n = sizes[j]

@@ -211,7 +211,7 @@ def of_blocks(
     segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
-    """Return the multi-octave Allan variance of a log that is given in blocks, in order, SI.
+    """Return the multi-octave Allan variance of a log, which is given in blocks, in order, SI.
 
     One pass; the memory grows with L/64 only. The result has the same bits for any number of
     threads and any blocks. ``samples`` is L, the length of all blocks, and with ``holes`` samples

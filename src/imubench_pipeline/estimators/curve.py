@@ -46,7 +46,7 @@ class _Curve:
         return slope, math.sqrt(crowd / moment)
 
     def level(self, inside: NDArray[np.bool_] | slice, slope: float, tau: float) -> float:
-        """Return the deviation at ``tau`` of a line of a given slope through the points inside."""
+        """Fit a line of given slope to the points inside; return its deviation at ``tau``."""
         weight = self.error[inside] ** -2
         offset = np.average(self.deviation[inside] - slope * self.tau[inside], weights=weight)
         return float(10.0 ** (offset + slope * math.log10(tau)))

@@ -46,7 +46,7 @@ class Models:
     weight: float = 1.0  # of all these models together, see `Candidate.weight`
 
     def parameter(self, letter: str) -> Array:
-        """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
+        """Return Q, N, B of flicker noise (letter F) or K of each model, (d,); 0 if absent."""
         if letter not in self.terms.linear:
             return np.zeros(len(self.parameters))
         return self.parameters[:, self.terms.linear.index(letter)]
@@ -101,7 +101,7 @@ def compute_curve_bias(models: Models, longest: float) -> tuple[Array, Array]:
 
 
 def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the lowest point of the Allan deviation of models (see `locate_minimum`)."""
+    """Return the lowest point of the Allan deviation of each model (see `locate_minimum`)."""
     variance = (
         3.0 * models.parameter("Q")[:, None] ** 2 / tau**2
         + models.parameter("N")[:, None] ** 2 / tau
@@ -115,11 +115,11 @@ def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray
 
 
 def locate_minimum(level: Array, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the lowest points of Allan deviations, from logarithms of variances, shape (d, m).
+    """Return the lowest point of each Allan deviation.
 
-    ``tau``, shape (m,), is evenly spaced in the logarithm, s; a parabola interpolates between its
-    points. Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s,
-    and whether it is a minimum, and not an end of ``tau``.
+    ``level``, shape (d, m), are logarithms of Allan variances at ``tau``, s, shape (m,), which is
+    evenly spaced in the logarithm; a parabola interpolates. Returned are the deviation, rad/s or
+    m/s², its tau, s, and whether it is a minimum and not an end of ``tau``; all have shape (d,).
     """
     rows = np.arange(len(level))
     lowest = level.argmin(axis=1)
@@ -150,8 +150,8 @@ def add_curve_figures(
     """Return an estimate by likelihood, with the figures of its curve (`CURVE`) added.
 
     Values follow from the model of the estimate, intervals from the draws of all models that the
-    log does not rule out, weighted by BIC. (By AIC, a slow process in place of the random walk has
-    the weight of the walk: limits would be twice as wide as needed.) ``alike`` are the models that
+    log does not rule out, weighted by BIC. (By AIC, a model with a slow process instead of the walk
+    has the same weight: limits would be twice as wide as needed.) ``alike`` are the models that
     the log does not rule out, the chosen one first; ``wider`` are models with one more bias
     instability, for the upper limit of an absent one; ``tau`` is from `make_averaging_times`.
     """

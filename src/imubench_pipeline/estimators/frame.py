@@ -93,10 +93,10 @@ def select_for_fit(
 ) -> FitSelection:
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
-    ``line_spectra`` are as in `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
-    is the highest frequency to use, Hz, by default as far as the low-pass filter does not matter;
-    ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
-    step of the register, SI, or 0.
+    ``line_spectra`` are as in `imubench_pipeline.estimators.spectrum.compute_spectra`. ``band`` is
+    the highest frequency to use, Hz; by default, as far as the low-pass filter does not matter.
+    ``bandwidth`` is the configured cut-off of the sensor's filter, Hz, if known. ``resolution`` is
+    the step of the register, SI; 0 if not known.
     """
     all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(band or np.inf, _LINE_MODEL_BAND * spectrum.rate)

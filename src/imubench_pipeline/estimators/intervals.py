@@ -99,7 +99,7 @@ def list_parameter_names(terms: Terms) -> list[str]:
 def find_durations_needed(
     maximum: Maximum, rate: float, duration: float, highest: float
 ) -> list[float | None]:
-    """Return log durations, s, that determine each parameter to a tenth; None if none does."""
+    """Return the log duration, s, that determines each parameter to a tenth; None if none does."""
     lengths = duration * _DURATION_RATIOS
     lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * maximum.terms.parameters]
     errors = [
@@ -146,11 +146,11 @@ def add_upper_limits(
     wider: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> Estimate:
-    """Return an estimate with upper limits of K and B if its model does not have them.
+    """Return an estimate with upper limits of K and B if its model does not have these terms.
 
-    They are ``not_identified`` if a model with the term is about as good as the chosen one, else
+    K or B is ``not_identified`` if a model with the term is about as good as the chosen one, else
     ``absent``. ``alike`` are the models that the log does not rule out, the chosen one first;
-    ``wider`` are models with a random walk, or one bias instability, in addition to its terms.
+    ``wider`` are models with its terms, and in addition a random walk or one bias instability.
     """
     parameters = dict(estimate.parameters)
     for name in ("K", "B"):
@@ -187,9 +187,10 @@ def describe(
 ) -> Estimate:
     """Return the estimate of a fit: a value with its interval, or a status, by parameter.
 
-    The intervals of all parameters cover the models ``alike``, ``chosen`` among them, weighted by
-    AIC. K is the median over them: they share the power of the lowest frequencies in different
-    ways, and the median is a fifth nearer to the truth than a single model where K is poorly known.
+    The intervals of all parameters cover the models ``alike``, which include ``chosen``, weighted
+    by AIC. K is the median over these models: they divide the power of the lowest frequencies
+    differently, and where K is poorly known, the median is a fifth nearer to the truth than a
+    single model.
     """
     maximum = chosen.maximum
     names = list_parameter_names(maximum.terms)
@@ -262,7 +263,7 @@ def compute_mixture_quantiles(
 
 
 def compute_mixture_limits(parts: Sequence[tuple[Array, float]], own: Array) -> tuple[float, float]:
-    """Return the 95 % limits of draws of several models, widened to the limits of ``own``."""
+    """Return 95 % limits of draws of several models that include the 95 % limits of ``own``."""
     both = [compute_mixture_quantiles(draws, 0.025, 0.975) for draws in (parts, [(own, 1.0)])]
     return min(lower for lower, _ in both), max(upper for _, upper in both)
 

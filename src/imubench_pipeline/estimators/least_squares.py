@@ -62,7 +62,7 @@ def fit(
 
     The cost is sum_i w_i (variance_i - model(tau_i))^2. With n of L samples in a cluster,
 
-    - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, one over the variance of an Allan variance;
+    - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the inverse variance of an Allan variance;
     - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), for the papers' figures.
       This cost has a dimension, so that the bottom of the curve counts less, which makes little
       difference on these tau (`tests/papers/test_panel.py`).
@@ -253,11 +253,11 @@ class Errors:
     def factors(
         self, name: str, doubtful: Sequence[str], beside: float | None = None
     ) -> tuple[float, float]:
-        """Return the factors from a parameter to its 95 % limits, with and without doubtful terms.
+        """Return the factors from a parameter to 95 % limits that also hold without doubtful terms.
 
         Without a term, the parameter moves by its regression on the density of that term.
-        ``beside`` is the standard error with those terms fixed; by default they vary. If the square
-        of an amplitude is less than 1.96 standard errors from 0, its lower limit is 0.
+        ``beside`` is its standard error with the doubtful terms fixed; by default they vary. If the
+        square of an amplitude is less than 1.96 standard errors from 0, its lower limit is 0.
         """
         error = self.of(name) if beside is None else beside
         low, high = -SIGMAS * error, SIGMAS * error

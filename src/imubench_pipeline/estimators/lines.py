@@ -78,7 +78,7 @@ class Line:
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the lines by frequency; block means show lines up to ``crossover``, Hz."""
+    """Return the spectral lines, sorted by frequency; up to ``crossover``, Hz, from block means."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0

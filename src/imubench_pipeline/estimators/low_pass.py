@@ -76,7 +76,7 @@ class Filter:
         return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
 
     def flicker(self, frequency: Array, rate: float) -> Array:
-        """Return the gain for flicker noise with its nearest aliases, above 0 Hz."""
+        """Return the power gain for flicker noise and its nearest aliases; not for 0 Hz."""
         if self.kind == "bilinear":
             return self.slow(frequency, rate)
         distance = np.abs(frequency + rate * np.arange(-_ALIASES, _ALIASES + 1)[:, None])
@@ -86,7 +86,7 @@ class Filter:
         return np.asarray(sampled * total)
 
     def half_power(self, rate: float) -> float:
-        """Return the frequency, Hz, at which G is half of G(0), for a boxcar with its aliases."""
+        """Return the cut-off, Hz; of a boxcar, where G with aliases is half of G(0)."""
         if self.kind != "boxcar":
             return self.cutoff
         half = 0.5 * float(self.white(0.0, rate))

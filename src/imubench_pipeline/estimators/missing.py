@@ -41,7 +41,7 @@ class BlockMeans:
 
 @dataclass(frozen=True)
 class SlowPath:
-    """The slow part of the noise, the level of the log included, linear between knots."""
+    """The slow part of the noise, with the level of the log; it is linear between knots."""
 
     sample: Array  # (k,): places of the knots: the middles of blocks, and the ends of parts
     value: Array  # (k,): rad/s or m/s²
@@ -70,8 +70,9 @@ def yield_present_samples(
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Yield the block numbers of the samples that are present, and these samples, part by part.
 
-    The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
-    (b,), first and one-past-last sample of each block, rising. Other samples are left out.
+    The parts are the log in order, NaN where a sample is missing. ``begin`` and ``end``, shape
+    (b,), are first and one-past-last sample of each block, ascending. Samples outside of all blocks
+    are left out.
     """
     reached = 0
     for values in parts:
@@ -107,8 +108,8 @@ def draw_slow_part(
 ) -> SlowPath:
     """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`).
 
-    The difference between the measured and the simulated means is smoothed as a random walk in
-    white noise. Across a gap it is a straight line, with the simulated path on it.
+    A slow path is simulated. The difference between the measured and the simulated means is
+    smoothed as a random walk in white noise, linear across a gap, and added to the path.
     """
     interval = BLOCK_SAMPLES / rate
     white = max(model.N**2 * rate, 1e-300)
@@ -153,7 +154,7 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log, with missing samples (NaN) replaced by path plus white noise."""
+    """Yield the blocks of a log, with each NaN replaced by the slow path plus white noise."""
     reached = 0
     for values in blocks:
         missing = np.flatnonzero(~np.isfinite(values))

@@ -59,7 +59,7 @@ class Mixture:
         return np.asarray(self.means[which] + np.einsum("nij,nj->ni", roots[which], normal))
 
     def densities(self, points: Array) -> Array:
-        """Return weight times density of each component, up to a constant, shape (n, c)."""
+        """Return weight times density of each component at n points, up to a constant, (n, c)."""
         densities = np.empty((len(points), len(self.weights)))
         freedom = _get_degrees(points.shape[1])
         set_densities(points, self.weights, self.means, self._inverses, freedom, densities)
@@ -70,7 +70,7 @@ class Mixture:
         return np.linalg.inv(np.linalg.cholesky(self.scales))
 
     def fitted(self, points: Array) -> "Mixture":
-        """Return the mixture after one expectation-maximisation step on points."""
+        """Return the mixture fitted to points by one expectation-maximisation step."""
         parts, freedom = self.densities(points), _get_degrees(points.shape[1])
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)
         scales = np.zeros_like(self.scales)
@@ -83,7 +83,7 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Weighted:
-    """Points drawn from a density, with their importance weights."""
+    """Points with importance weights, which together represent a density."""
 
     points: Array  # (n, d)
     weights: Array  # (n,): they sum up to 1
@@ -114,8 +114,8 @@ def sample_adaptively(
 
     Adaptive multiple importance sampling (J.-M. Cornuet et al., Scand. J. Stat. 39, 2012).
     ``log_density`` returns the logarithm of the density at points, shape (n, d), up to a constant,
-    -inf where it is 0; ``first`` is the proposal of the first round; a round has ``size`` points, a
-    power of 2, all rounds at most ``most``; ``wanted`` is the effective sample size.
+    -inf where it is 0. ``first`` is the proposal of the first round. A round has ``size`` points, a
+    power of 2; all rounds together have at most ``most``. ``wanted`` is the effective sample size.
     """
     mixtures, mixture = [first], first
     points = np.empty((0, first.means.shape[1]))
@@ -224,7 +224,7 @@ class _Target:
         return result
 
     def amplitudes(self, points: Array) -> Array:
-        """Return (log amplitude ..., log T_B ...) of points."""
+        """Return points in the coordinates (log amplitude ..., log T_B ...)."""
         result = points.copy()
         z = points[:, : self.terms]
         # log sinh z without overflow.

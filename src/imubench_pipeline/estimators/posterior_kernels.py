@@ -31,7 +31,7 @@ _LONGEST_STEP = 1.5
 def compute_log_posterior(
     point: Array, problem: Problem, model: Array, shape: Array
 ) -> tuple[float, float, float]:
-    """Return the log posterior at a point, the best R and its information; overwrite ``model``."""
+    """Return log posterior, best R and its Fisher information at a point; overwrite ``model``."""
     fixed, bins, with_ramp, table = problem
     b, linear = fixed.shape
     processes = (point.size - linear) // 2
@@ -179,7 +179,7 @@ def _square(point: Array, mean: Array, inverse: Array) -> float:
 def set_densities(
     points: Array, weights: Array, means: Array, inverses: Array, freedom: int, densities: Array
 ) -> None:
-    """Set ``densities``, (n, c), to weight times density of each component, up to a constant."""
+    """Set ``densities``, (n, c), to weight times density of each component at each point."""
     n, d = points.shape
     for k in range(weights.size):
         factor = weights[k]

@@ -38,24 +38,24 @@ class Scores:
 
 
 def weights(error: Array) -> Array:
-    """Return weights of tau, with the sum 1, from the relative standard errors, shape (m,)."""
+    """Return the weight of each tau, with the sum 1, from its relative standard error, (m,)."""
     weight = 1.0 / (error**2 + SUREST**2)
     return np.asarray(weight / weight.sum())
 
 
 def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
-    """Return the RMS over the last axis of differences of curves; weights of shape (m,), sum 1."""
+    """Return the RMS difference of curves, along the last axis; weights of shape (m,), sum 1."""
     return np.asarray(np.sqrt(np.average((one - other) ** 2, axis=-1, weights=weight)))
 
 
 def beats(one: Array, other: Array) -> float:
-    """Return the probability that an RMS out of ``one``, shape (k,), is below one of ``other``."""
+    """Return the probability that a random value of ``one`` is below a random one of ``other``."""
     place = np.searchsorted(np.sort(other), one, side="right")
     return float(1.0 - np.mean(place) / other.size)
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Return scores of a model, shape (m,), and its draws, (k, m), against a curve, (m,), SI."""
+    """Compare curves of a model, (m,), and of its draws, (k, m), with the measured, (m,), SI."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

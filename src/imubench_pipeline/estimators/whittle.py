@@ -270,7 +270,7 @@ class Whittle:
         return np.asarray(self.matrix(maximum.terms, maximum.times) @ maximum.powers)
 
     def data(self, maximum: Maximum) -> Array:
-        """Return the measured density in each bin, less the ramp of a model."""
+        """Return the measured density in each bin, with the ramp of a model removed."""
         spectrum, R = self.spectrum, maximum.ramp
         return np.asarray(spectrum.density - 2.0 * R * spectrum.cross + R**2 * spectrum.ramp)
 

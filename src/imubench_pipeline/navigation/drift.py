@@ -69,8 +69,8 @@ class Series(NamedTuple):
 def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Order]:
     """Return the recordings of one device in order of time, and the key of that order.
 
-    The key is ``started`` if each has an ISO 8601 stamp and not all are the same; without a zone it
-    is UTC. Else it is the name, with its numbers as numbers: run_2 before run_10.
+    The key is ``started`` if each has an ISO 8601 stamp and not all are the same; a stamp without a
+    zone is UTC. Else the key is the name, with numbers in numeric order: run_2 before run_10.
     """
 
     def split_numbers(row: RecordingRow) -> tuple[list[tuple[str, int]], str]:
@@ -90,7 +90,7 @@ def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Or
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
-    """Yield a series per device with two ``ok`` recordings or more; simulated ones are apart."""
+    """Yield a series per device with two ``ok`` recordings or more, simulated or measured."""
     groups: dict[tuple[str, str, bool], list[RecordingRow]] = {}
     for row in recordings:
         if row.status == "ok":

@@ -60,7 +60,7 @@ class AxisErrors:
 
     @property
     def noise(self) -> "AxisErrors":
-        """The same axis with only its noise."""
+        """The same axis with its noise as the only error."""
         return AxisErrors(self.model)
 
 
@@ -384,11 +384,11 @@ def _add_figures(
 def find_largest_figures(
     nominal: Budget, limit: float | None, upper: float
 ) -> dict[ErrorSource, float]:
-    """Return the largest figures, SI, with which a limit is met, in place of class limits.
+    """Return the largest figures, SI, that meet a limit if they replace class limits.
 
-    The variance below the limit that other sources leave is divided equally; figures are 0 if none
-    is left. Sources that need less with their class limit are omitted. The other sources include
-    the uncertainty of the total, up to its limit ``upper``, unless they then exceed the limit.
+    The variance that other sources leave below the limit is divided equally; figures are 0 if none
+    is left. Sources whose class limit needs less than this share are omitted. The other sources
+    include the uncertainty of the total, up to ``upper``, unless they then exceed the limit.
     """
     parts = [
         part
@@ -427,7 +427,7 @@ def collect_axis_errors(
 def draw_axis_errors(
     channel: str, estimate: Estimate, figures: in_use.Figures, draws: int, seed: int
 ) -> list[AxisErrors]:
-    """Return error sources of a channel drawn from their uncertainty, in its own random stream."""
+    """Draw error sources of a channel from their uncertainty; each channel has a random stream."""
     stream = partial(channel_rng, seed, repr(estimate.model), channel)
     models = uncertainty.draw_models(estimate, draws, stream("budget"))
     of_use = _draw_figures(figures, draws, stream("temperature of the budget"))

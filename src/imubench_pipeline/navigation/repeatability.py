@@ -22,8 +22,8 @@ def repeatability_rows(
     """Yield the rows of the table ``repeatability``: bias spread and printed repeatability.
 
     A recording is omitted if it is not used in comparisons, or if the power stayed on before it,
-    since it belongs to the previous turn-on. ``tolerance`` is the largest relative difference with
-    the verdict ``as printed``.
+    since it belongs to the previous turn-on. ``tolerance`` is the largest relative difference that
+    has the verdict ``as printed``.
     """
     about = {(row.sensor, row.recording): row for row in recordings if row.decides}
     by_channel: dict[tuple[str, str, str], list[tuple[RecordingRow, float]]] = {}

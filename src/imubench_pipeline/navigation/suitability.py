@@ -231,7 +231,7 @@ def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudge
 
 
 def compute_variance_shares(total: float, sources: Iterable[ErrorBudgetRow]) -> tuple[Share, ...]:
-    """Return the sources with 1 % or more of the variance ``total``^2, the largest first."""
+    """Return the sources with 1 % or more of ``total``^2, the largest first, with their shares."""
     if total <= 0.0:
         return ()
     shares = (

@@ -56,7 +56,10 @@ def of_white(order: int, time: float) -> float:
 
 
 def of_white_mean(order: int, time: float, start: SensorStart) -> float:
-    """Return c^2 / W, the variance by the mean of white noise in the window; 0 without a window."""
+    """Return c^2 / W: variance due to the mean of white noise, N = 1, in a window of W s; or 0.
+
+    c is from `of_constant`. It is 0 if ``start`` has no window.
+    """
     if isinstance(start, Uncalibrated):
         return 0.0
     return of_constant(order, time) ** 2 / start.window

@@ -43,10 +43,10 @@ def compute_degrees_of_freedom(
     The first belong to the chi-squared variate with the same relative variance, the second to the
     variate with the same lower tail, for the upper limit; both have shape (m,).
 
-    ``sizes``, shape (m,), are n of each tau; no difference spans two segments. If samples are
-    missing, ``presence`` counts the others, and ``share``, (m,), is the share of the differences
-    that is not lost. The ramp and the lines of the model add to the Allan variance, but are not
-    noise. (C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
+    ``sizes``, shape (m,), are the samples per cluster; no difference spans two segments. If samples
+    are missing, ``presence`` counts the samples present, and ``share``, (m,), is the fraction of
+    the differences that remain. The ramp and the lines of the model add to the Allan variance, but
+    are not noise. (C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
     differences", PTTI 2003, for power laws; W. Satterthwaite, Biometrics Bulletin 2, 1946.)
     """
     spans = list_spans(segments, samples)

@@ -57,7 +57,7 @@ class StateSpace:
         )
 
     def of_either_sign(self) -> "StateSpace":
-        """Return the model with an initial mean of 0, and its square added to the variance."""
+        """Return the model with initial mean 0; its squared mean is added to the variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
         mean, variance = np.zeros_like(self.initial_mean), self.initial_variance + squares
         return replace(self, initial_mean=mean, initial_variance=variance)
@@ -92,7 +92,7 @@ def factor_covariance(covariance: Array) -> Array:
 
 
 def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
-    """Return Phi^times, and the sum of Phi^i noise (Phi^i)^T over i < times, by powers of two."""
+    """Return Phi^times, and the sum of Phi^i noise (Phi^i)^T for i < times; Phi: transition."""
     whole, added = np.eye(len(transition)), np.zeros_like(noise)
     while times:
         if times & 1:

@@ -36,7 +36,7 @@ def compute_variance_covariance(
 
     integrated with stratified sampling in log w, one point per stratum. The error of the standard
     deviation is below 1.5 % for tau up to a ninth of the log, and 5 % up to a quarter. ``sizes``,
-    shape (m,), are n of each tau, at most L/2; L is ``samples``. The covariance, (rad/s)^4 or
+    shape (m,), are the cluster sizes n, at most L/2; L is ``samples``. The covariance, (rad/s)^4 or
     (m/s²)^4, (m, m), is positive semi-definite. (D. Percival and A. Walden, "Wavelet Methods for
     Time Series Analysis", 2000, section 8.3; the factor M here is fitted to exact sums.)
     """

@@ -63,7 +63,7 @@ class DeterministicSignals:
         return self.searched is not None and self.searched.many
 
     def subtract_from(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log, in order, SI, less the signals."""
+        """Yield the blocks of a log, in order, SI, with the signals removed."""
         reached = 0
         for values in blocks:
             stop = reached + len(values)

@@ -47,7 +47,7 @@ class Regressor:
         return 2 if self.kind == "sinusoid" else 1
 
     def means(self, n: int) -> Array:
-        """Return its means in n blocks, shape (columns, n)."""
+        """Return the means of the signal in n blocks, shape (columns, n)."""
         i = np.arange(n, dtype=np.float64)
         if self.kind == "step":
             first = self.where - 0.5 * self.length
@@ -58,11 +58,11 @@ class Regressor:
         return np.asarray(scale * self.at(i + 0.5))
 
     def coefficients(self, n: int) -> Array:
-        """Return its orthonormal DCT-II coefficients 1 ... n - 1, shape (columns, n - 1)."""
+        """Return orthonormal DCT-II coefficients 1 ... n - 1 of the signal, (columns, n - 1)."""
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
-        """Return its values, shape (columns, s), at times in blocks from the start of its part."""
+        """Return the signal, (columns, s), at times in blocks from the start of its part, (s,)."""
         if self.kind == "step":
             return (blocks >= self.where).astype(np.float64)[None]
         if self.kind == "exponential":
@@ -114,11 +114,11 @@ class Ordinates:
         return int(self.used.sum()) >= 64 and float(np.ptp(self.coefficient)) > 0.0
 
     def part(self, number: int) -> slice:
-        """Return the slice of the ordinates of a part."""
+        """Return the slice of the ordinates that belong to a part of the log."""
         return slice(int(self.starts[number]), int(self.starts[number + 1]))
 
     def columns(self, regressor: Regressor) -> Array:
-        """Return the coefficients of a regressor, shape (columns, n - 1) of its part."""
+        """Return the coefficients of a regressor in its part of n blocks, (columns, n - 1)."""
         if regressor not in self._columns:
             self._columns[regressor] = regressor.coefficients(self.sizes[regressor.part])
         return self._columns[regressor]
@@ -149,7 +149,7 @@ class Ordinates:
         return make_whittle(spectrum, float(self.frequency[self.used].max()), COARSE)
 
     def fit_noise(self, residual: Array, leverage: Array | float = 0.0) -> tuple[Maximum, Array]:
-        """Return the noise model of a residual, shape (k,), and its density, shape (k,)."""
+        """Return the noise model fitted to a residual, (k,), and the density of the model, (k,)."""
         weight = np.maximum(np.ones_like(residual) - leverage, _MIN_WEIGHT)
         noise = self.whittle.of(self.spectrum(residual, weight)).maximum(NOISE_TERMS)
         return noise, self.density(noise)
@@ -174,7 +174,7 @@ class Ordinates:
         return Fit(tuple(regressors), *fitted, self.log_likelihood(residual, density))
 
     def extrapolate_density(self, fit: Fit, held_out: int) -> Array:
-        """Return the density of noise fitted without the lowest ordinates, extrapolated to them."""
+        """Fit noise without the lowest ordinates; return its density at all, (k,)."""
         spectrum = self.spectrum(fit.residual, np.maximum(1.0 - fit.leverage, _MIN_WEIGHT))
         beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
         if beyond.sum() < 4 * NOISE_TERMS.parameters:
@@ -208,7 +208,7 @@ class Ordinates:
 
 
 def solve_weighted(columns: Array, weight: Array, coefficient: Array) -> tuple[Array, Array, Array]:
-    """Return weighted least squares amplitudes (p,), covariance (p, p) and right side (p,)."""
+    """Solve weighted least squares; return amplitudes (p,), covariance (p, p), right side (p,)."""
     weighted = columns * weight
     gram = weighted @ columns.T
     norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))

@@ -72,7 +72,7 @@ class Gain:
         return float(self.of_columns(regressor.coefficients(self._size)[None])[0])
 
     def of_columns(self, columns: Array) -> Array:
-        """Return the gain of each of c candidates with q columns of k ordinates, (c, q, k)."""
+        """Return the gain of each of c candidates; a candidate has q columns of k ordinates."""
         lowest = slice(columns.shape[2])
         weighted = columns * self.weight[lowest]
         whole = weighted @ np.swapaxes(columns, 1, 2)
@@ -86,7 +86,7 @@ class Gain:
         return np.where(good, np.sum(target * solved, axis=1), 0.0)
 
     def of_steps(self) -> tuple[Array, float]:
-        """Return the gains of steps before blocks 1 to n - 1, and how many are independent."""
+        """Return the gains of steps before each of blocks 1 to n - 1; how many are independent."""
         n = self._size
         k = np.arange(1, n)
         slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
@@ -132,7 +132,7 @@ def find_best_scores(
 
 
 def list_restarts(means: Means) -> list[Regressor]:
-    """Return a step at each pause."""
+    """Return a step as regressor for each pause of the log."""
     return [
         Regressor("step", number, *pause)
         for number, part in enumerate(means.parts)
@@ -245,7 +245,7 @@ def _find_candidates(
 def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
-    """Return regressors with place, time constant or frequency of one of them optimised."""
+    """Optimise place, time constant or frequency of regressor ``which``; return all regressors."""
     best = regressors[which]
     n = ordinates.sizes[best.part]
     steps = {"step": 0.5, "exponential": 0.12 * best.where, "sinusoid": 0.125 / n}

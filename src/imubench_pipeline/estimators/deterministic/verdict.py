@@ -76,7 +76,7 @@ def assess_signals(
 def state_effects(
     findings: Iterable[Finding], estimate: Estimate, without: Mapping[str, float], mean: float
 ) -> tuple[Finding, ...]:
-    """Return findings that state how parameters would change without the removal of signals.
+    """Return findings with the change of each parameter if no signal is removed.
 
     A signal that changes no value by more than a tenth of its interval casts no doubt. ``without``
     are the values of `imubench_pipeline.estimators.robust.fit.fit_values` from the log with all

@@ -30,14 +30,14 @@ _RIDGE = 1e-12  # Relative, for collinear columns
 
 @dataclass(frozen=True)
 class Solutions:
-    """Squares of the parameters of many curves, shape (q, 5), in the order of the columns."""
+    """Squared parameters fitted to q Allan variances, shape (q, 5), in the order of the columns."""
 
     squares: Array
     times: Array  # (q,): T_B, s; NaN without a process
     cost: Array  # (q,): chi-squared, with the gains that the chosen terms must bring
 
     def model(self, number: int = 0) -> NoiseModel:
-        """Return the noise model of a curve."""
+        """Return the noise model that was fitted to one of the curves, counted from 0."""
         N, F, G, K, R = np.sqrt(self.squares[number]).tolist()
         T_B = float(self.times[number])
         if F > 0.0 and G > 0.0:
@@ -68,13 +68,13 @@ class TermSearch:
         self._gains = np.where(self._masks[:, PROCESS], of_process, 0.0)
 
     def design(self, T_B: float) -> Array:
-        """Return the columns, shape (m, 5), with a process of the tried time nearest to T_B."""
+        """Return the Allan variances of unit terms, (m, 5), with the tried T_B nearest to this."""
         if not np.isfinite(T_B):
             return self._columns[0]
         return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
 
     def exclude(self, term: int) -> "TermSearch":
-        """Return a search among the sets that do not contain a term."""
+        """Return the same search, limited to sets of terms without this one."""
         search = copy(self)
         search._gains = np.where(self._masks[:, term], np.inf, self._gains)
         return search
@@ -82,14 +82,14 @@ class TermSearch:
     def find_limits(
         self, term: int, grid: Array, variance: Array, whitening: Array
     ) -> tuple[float, float]:
-        """Return the 95 % limits of a square by profile likelihood, on a grid of squares."""
+        """Return 95 % limits of a term's squared parameter in ``grid``, by profile likelihood."""
         curves = variance - grid[:, None] * self._columns[0, :, term]
         cost = self.exclude(term).solve(curves, whitening).cost
         likely = grid[cost <= cost.min() + _MAX_PROFILE_LOSS]
         return float(likely[0]), float(likely[-1])
 
     def solve(self, variances: Array, whitening: Array) -> Solutions:
-        """Return the best non-negative solutions of curves, (q, m), whitened by (r, m)."""
+        """Fit terms to Allan variances (q, m); ``whitening``, (r, m), makes errors independent."""
         target = variances @ whitening.T
         columns = whitening @ self._columns
         size = np.linalg.norm(columns, axis=1)

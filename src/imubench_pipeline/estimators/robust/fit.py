@@ -189,7 +189,7 @@ class _Points:
         return self.search.design(float(solutions.times[0])) @ solutions.squares[0]
 
     def covariance(self, model: NoiseModel, expected: Array, samples: int) -> Array:
-        """Return the covariance of the relative variances of a log of a model, shape (m, m)."""
+        """Return the covariance of relative Allan variances of a log with a model, shape (m, m)."""
         curve = self.curve
         stochastic = replace(model, R=0.0)
         covariance = compute_variance_covariance(
@@ -201,7 +201,7 @@ class _Points:
         return covariance * np.outer(clipped, clipped)
 
     def model_covariance(self, error: float) -> Array:
-        """Return the covariance of errors of the model and of the lines, shape (m, m)."""
+        """Return the covariance, (m, m), due to errors of the model and errors of the lines."""
         place = np.log10(self.curve.tau)
         near = np.exp(-np.abs(place[:, None] - place) / _DECADES_OF_MODEL_ERROR)
         return error**2 * near + np.outer(self.line_error, self.line_error)

@@ -38,7 +38,7 @@ class PartVariances:
     terms: Array  # (PARTS, m): number of these differences; 0 where a part is too short
 
     def select(self, points: NDArray[np.bool_]) -> "PartVariances":
-        """Return the sums at the points of a mask, shape (m,)."""
+        """Return the variances at the points that a mask, shape (m,), selects."""
         return PartVariances(self.squares[:, points], self.terms[:, points])
 
     def divide(self, number: int) -> Array:
@@ -85,7 +85,7 @@ def compute_part_variances(
 def estimate_excess(
     parts: PartVariances, curve: AllanCurve, influence: Array, covariance: Callable[[int], Array]
 ) -> float:
-    """Return the variance of the logarithm of a parameter between parts, beyond sampling errors.
+    """Return the variance of ln(parameter) between parts of a log, without sampling errors.
 
     ``influence``, shape (m,), are the derivatives of the logarithm of the parameter by the
     logarithms of the variances; ``covariance`` returns, for a number of samples, the covariance of

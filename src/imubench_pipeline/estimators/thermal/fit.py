@@ -42,14 +42,14 @@ class ThermalFit:
     path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Return the blocks of the log, in order, SI, less the effect of temperature."""
+        """Yield the blocks of the log, in order, SI, with the effect of temperature removed."""
         return add_temperature_effect(blocks, self.path, -self.effect)
 
 
 def add_temperature_effect(
     blocks: Iterable[Array], path: TemperaturePath, effect: Array
 ) -> Iterator[Array]:
-    """Yield the blocks of a log plus the effect of temperature at the knots, shape (k,), SI."""
+    """Yield the blocks of a log with ``effect`` added: SI, at the knots of ``path``, shape (k,)."""
     reached = 0
     for values in blocks:
         points = np.arange(reached, reached + len(values))

@@ -162,18 +162,18 @@ class TemperaturePath:
 
     @property
     def range(self) -> float:
-        """Highest less lowest, °C."""
+        """Highest minus lowest temperature, °C."""
         return float(np.ptp(self.value))
 
     def at(self, points: NDArray[Any], values: Array) -> Array:
-        """Interpolate values at the knots, (k,), at ascending points of the grid, by segment."""
+        """Interpolate values given at the knots, (k,), to ascending points of the log's grid."""
         cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
         pieces = zip(np.split(points, cuts), self.parts, strict=True)
         pieces_at = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return means, (count,), over blocks from a first sample, of values at knots, (k,)."""
+        """Return the means of ``count`` blocks from sample ``first``; ``values`` at knots, (k,)."""
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
         # The integral from the first edge; flat beyond the first and the last knot.
@@ -184,7 +184,7 @@ class TemperaturePath:
         return np.asarray(np.diff(integral[np.searchsorted(points, edges)]) / block)
 
     def apply_lag(self, values: Array, rate: float, lag: float) -> Array:
-        """Return temperatures at the knots, (k,), behind a lag, s; segments begin at rest."""
+        """Return temperatures at the knots, (k,), behind a lag, s, with equilibrium at a start."""
         parts = [apply_lag(self.sample[part] / rate, values[part], lag) for part in self.parts]
         return np.concatenate(parts)
 

@@ -93,7 +93,7 @@ class Regression:
         return self.path.apply_lag(self.path.value, self.rate, lag) - self.path.mean
 
     def terms(self, lag: float, shape: Shape) -> Array:
-        """Return the terms of an effect at the knots of the path, shape (p, k), K or K²."""
+        """Return the terms of a temperature effect at the knots, shape (p, k), K or K²."""
         knots = self.knots(lag)
         terms = [knots, knots**2] if shape.quadratic else [knots]
         if shape.settling > 0.0:
@@ -107,7 +107,7 @@ class Regression:
         return min(int(np.searchsorted(self.path.sample, end)), len(self.path.sample) - 1)
 
     def columns(self, lag: float, shape: Shape) -> Array:
-        """Return the coefficients of the terms of an effect, shape (p, k)."""
+        """Return the DCT-II coefficients of the terms of a temperature effect, shape (p, k)."""
         if (lag, shape) not in self._known:
             means = [self.means(term) for term in self.terms(lag, shape)]
             self._known[lag, shape] = self.transform(np.array(means))
@@ -115,7 +115,7 @@ class Regression:
 
     @cached_property
     def time(self) -> Array:
-        """The coefficients of a ramp of 1 a second, shape (k,), s."""
+        """The DCT-II coefficients of a ramp of slope 1, shape (k,), s."""
         places = [part.start + self.block * np.arange(len(part.mean))
                   for part in self.ordinates.means.parts]  # fmt: skip
         return self.transform(np.concatenate(places) / self.rate)
@@ -129,13 +129,13 @@ class Regression:
         return np.concatenate(([0.0], np.geomspace(first, last, LAGS)))
 
     def solve(self, columns: Array, density: Array) -> tuple[Array, Array, float]:
-        """Return beta, its covariance, and the log likelihood that it gains."""
+        """Return beta, the covariance of beta, and the log likelihood that the columns add."""
         weight, coefficient = self.ordinates.weights(density), self.ordinates.coefficient
         beta, covariance, target = solve_weighted(columns, weight, coefficient)
         return beta, covariance, 0.5 * float(target @ beta)
 
     def gain(self, effect: Effect, shape: Shape) -> float:
-        """Return the log likelihood gained by a shape, for the noise and the lag of a fit."""
+        """Return the log likelihood that a shape adds, with noise and lag of ``effect``."""
         return self.solve(self.columns(effect.lag, shape), effect.density)[2]
 
     @cached_property
@@ -159,7 +159,7 @@ class Regression:
         return Effect(shape, lag, beta, covariance, noise, density, log_likelihood)
 
     def bracket_likely_lags(self, effect: Effect) -> Array:
-        """Return a fine scan of the lags that are not excluded."""
+        """Return a fine grid of lags, s, over those that the log does not exclude."""
         lags = self.lags
         for _ in range(2):
             effects = [replace(effect, lag=lag) for lag in lags.tolist()]

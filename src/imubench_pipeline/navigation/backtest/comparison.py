@@ -86,7 +86,7 @@ class DeadReckoning:
         return MIN_WINDOWS * (self.rest + self.time)
 
     def sigma(self, model: NoiseModel) -> float:
-        """Return the standard deviation of the error by a noise model, rad, m/s or m."""
+        """Return the standard deviation that a noise model predicts for it, rad, m/s or m."""
         start = Calibrated(self.rest)
         parts = of_sensor("gyro", model, self.order, self.time, start, self.factor)
         return math.hypot(*(part.sigma for part in parts))
@@ -171,7 +171,7 @@ def _compare(
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
-    """Yield a finding for each channel that contradicts its budget, for its least p-value."""
+    """Yield a finding for each channel that contradicts its budget: the row of least p-value."""
     by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:
         if row.contradicted and row.chance is not None and row.ratio is not None:

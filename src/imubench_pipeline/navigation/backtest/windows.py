@@ -230,7 +230,7 @@ class WindowCovariance:
         return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
-        """Return the covariance, SI^2, of errors from noise by lag in blocks, shape (lags,)."""
+        """Return the covariance, SI^2, that a model gives the errors at lags in blocks, (lags,)."""
         total = np.zeros(self.lags)
         pairs = np.correlate(self.weights, self.weights, "full")  # from -(blocks - 1) to blocks - 1
         reach = self.window.blocks - 1

@@ -124,7 +124,7 @@ def budget(
 
 
 def get_angle_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
-    """Return the factor of the integrated angle: gravity for a tilt, the speed for a track."""
+    """Return the factor of an integrated gyro error: gravity, the speed for a track, or 1."""
     if quantity == "cross_track":
         return use.speed
     return STANDARD_GRAVITY if GYRO_ORDER[quantity] > 0 else 1.0

@@ -231,7 +231,7 @@ class Judgement:
 
     @property
     def compared(self) -> bool:
-        """Whether the sensor is ranked among the others: it has all demanded properties."""
+        """Whether the sensor is ranked: its error is known, and it has all required properties."""
         return self.decides.known and not self.shortfalls and not self.open.unknown
 
     @property

@@ -152,7 +152,7 @@ def make_limit_key(row: ErrorBudgetRow) -> tuple[Any, ...]:
 
 
 def find_deciding_limit(by_limit: Sequence[Standing]) -> Standing:
-    """Return the deciding limit: the worst; an unknown one if no known limit fails."""
+    """Return the deciding limit: the worst known one, or if it does not fail, any unknown one."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]

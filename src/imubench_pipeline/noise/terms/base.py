@@ -155,7 +155,7 @@ class Term(ABC):
 
     @abstractmethod
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Covariance of cumulative sums at lags, SI^2, up to a + b lag^2; n: cluster size."""
+        """Covariance of cumulative sums at lags, SI^2, without any a + b lag^2; n: cluster size."""
 
     @abstractmethod
     def state_space(self, interval: float) -> StateSpace:
@@ -172,7 +172,7 @@ class Term(ABC):
 
     @abstractmethod
     def growth(self, order: int, time: float, start: SensorStart) -> float:
-        """Return the variance of its integrated error (`noise.growth`), without the turn-on bias.
+        """Return the variance of the integrated error (`noise.growth`), without turn-on bias.
 
         ``order`` is m, 0 to 2; ``time`` is t, s, above 0. W is the static window of ``start``, A
         its time since switch-on, s; c is t^(m+1) / (m+1)!. The unit is (rad/s)^2 or (m/s^2)^2 times
@@ -180,7 +180,7 @@ class Term(ABC):
         """
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return the variances of its first and second integral over a time, from a known state.
+        """Return the variances of the term's first and second integral at times from a known state.
 
         By default 0: the term does not grow, or a filter with the term predicts it exactly, or it
         has no finite state.
@@ -216,7 +216,7 @@ class Term(ABC):
         return draw_block_sums(space, self.start(rng, 1.0 / rate), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading | None:
-        """Return where to read the parameter on a curve that is lowest at a tau, s; or None."""
+        """Return where to read the parameter on a curve with its minimum at a tau, s; or None."""
         return None
 
     @property
@@ -226,7 +226,7 @@ class Term(ABC):
 
     @property
     def in_words(self) -> str:
-        """Its parameters with their values in SI."""
+        """The parameters of the term with their values in SI."""
         return ", ".join(f"{symbol} = {value:.3e}" for symbol, value in self.values.items())
 
     @property
@@ -235,7 +235,7 @@ class Term(ABC):
         return None
 
     def realised(self, interval: float, longest: float) -> "Sequence[Term]":
-        """Return terms with finite states that approximate it from ``interval`` to ``longest``."""
+        """Return terms with finite states, close to it at tau from ``interval`` to ``longest``."""
         return [self]
 
     def scaled(self, factor: float) -> Self:
@@ -250,7 +250,7 @@ class Term(ABC):
     def as_unit(self) -> "tuple[float, Term]":
         """Return a factor, and a unit term whose variances times the factor are this term's.
 
-        By default 1 and itself. If one parameter scales a kind, all its terms share the unit term.
+        By default 1 and the term itself. If a kind has one amplitude, its terms share a unit term.
         """
         return 1.0, self
 
@@ -261,7 +261,7 @@ class Term(ABC):
         yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over ``time`` that begins ``on_time`` after power-on."""
+        """Return the variance of the term's mean over ``time``, from ``on_time`` after power-on."""
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:

@@ -80,14 +80,14 @@ class Flicker(Term):
         return 2.0 / np.pi * self.B**2 * np.where(n <= most, table[index - 1] / index**2, large)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """Return B^2 / sqrt(2 - 2 cos(omega))."""
+        """Return B^2 / sqrt(2 - 2 cos(omega)), which does not depend on the interval."""
         return self.B**2 / np.abs(2.0 * np.sin(omega / 2.0))
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
         """Return -B^2 / (4 pi) times the integral of (1 - cos(2 k x)) / sin^3(x) from 0 to pi/2.
 
-        For long lags it is B^2 / (2 pi) k^2 ln(k), as in continuous time. A multiple of k^2 is left
-        out. All lags of a call use the same formula.
+        k is the lag. For long lags it is B^2 / (2 pi) k^2 ln(k), as in continuous time. A multiple
+        of k^2 is left out. All lags of a call use the same formula.
         """
         k = np.abs(lags)
         if k.max() <= 2 * _MAX_EXACT_SIZE:
@@ -124,7 +124,7 @@ class Flicker(Term):
         return scale * integrate_since_switch_on(order, start.on_time / time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Return -(B^2 / pi) times the second difference over k of k^2 (ln k - 3/2) / 2."""
+        """Return -(B^2 / pi) times the second difference of k^2 (ln k - 3/2) / 2; k: lag."""
         k = np.maximum(lags, 1.0)
         far = np.maximum(k, _MIN_LAG_FOR_SERIES)
         series = np.log(far) - 1.0 / (12.0 * far**2) - 1.0 / (60.0 * far**4)
@@ -225,10 +225,10 @@ def integrate_since_switch_on(order: int, on_time: float) -> float:
 
 
 def integrate_after_window(order: int, window: float) -> float:
-    """Return the variance of the (m+1)-fold integral less the mean over a window, for B = 1.
+    """Return the variance of the (m+1)-fold integral after a static window, for B = 1.
 
-    The integral is over a unit of time directly after the window; ``order`` m is 0 to 2. For m = 0
-    and a ``window`` of r such units it is
+    The mean over the window is first subtracted from the noise. The integral is over a unit of time
+    directly after the window; ``order`` m is 0 to 2. For m = 0 and a ``window`` of r units it is
 
         (1/pi) (1 + r) (ln(1 + 1/r) + ln(1 + r) / r),
 

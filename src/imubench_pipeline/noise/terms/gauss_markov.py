@@ -80,7 +80,7 @@ class GaussMarkov(base.Term):
         return self.density * evaluate_sampled_shape(n, interval, self.T_B)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """Return (S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
+        """Return (S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2), p = e^(-interval/T_B)."""
         p = math.exp(-interval / self.T_B)
         gap = math.expm1(-interval / self.T_B) ** 2 + p * 4.0 * np.sin(omega / 2.0) ** 2
         return -self._variance * math.expm1(-2.0 * interval / self.T_B) / gap
@@ -88,7 +88,8 @@ class GaussMarkov(base.Term):
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
         """Return -v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
 
-        v is S_B T_B / 2. For clusters far shorter than T_B the process counts as a random walk.
+        v is S_B T_B / 2, k the lag, T the interval. For clusters far shorter than T_B the process
+        counts as a random walk.
         """
         if n * interval < _MAX_RATIO_FOR_WALK * self.T_B:
             return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
@@ -97,7 +98,7 @@ class GaussMarkov(base.Term):
         return -self._variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
 
     def state_space(self, interval: float) -> StateSpace:
-        """Return a stationary model: Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B))."""
+        """Return a stationary model: Phi = e^(-interval/T_B), Q_d = S_B T_B / 2 (1 - Phi^2)."""
         drive = -self._variance * math.expm1(-2.0 * interval / self.T_B)
         return StateSpace.scalar(math.exp(-interval / self.T_B), drive, self._variance)
 
@@ -138,9 +139,9 @@ class GaussMarkov(base.Term):
         return self.density * (driven + constant**2 * (in_window + self.T_B * lost**2 / 2.0))
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """Return S_B times the integral of h^2 from 0 to t, for the first and second integral.
+        """Return S_B times the integral of h(s)^2 from 0 to t, for the first and second integral.
 
-        First: h = T_B (1 - e^(-s/T_B)). Second: h = T_B s - T_B^2 (1 - e^(-s/T_B)).
+        First: h = T_B (1 - e^(-s/T_B)). Second: h = T_B s - T_B^2 (1 - e^(-s/T_B)). t is ``time``.
         """
         x = time / self.T_B
         first, second = np.zeros_like(x), np.zeros_like(x)
@@ -158,7 +159,7 @@ class GaussMarkov(base.Term):
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Return v ((1 - e^-x) / x)^2 e^(-(k-1) x), and 2 v (x - 1 + e^-x) / x^2 at k = 0.
 
-        Here x = d / T_B and v = S_B T_B / 2.
+        Here k is the lag, x = ``block`` / T_B and v = S_B T_B / 2.
         """
         x = block / self.T_B
         apart = (math.expm1(-x) / x) ** 2 * np.exp(-(np.maximum(lags, 1.0) - 1.0) * x)
@@ -167,8 +168,9 @@ class GaussMarkov(base.Term):
     def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """Return v s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B).
 
-        v is S_B T_B / 2. The lag is from the last sample of one block to the first of the other.
-        The diagonal is v (n (1 + p) / (1 - p) - 2 p (1 - p^n) / (1 - p)^2) / n^2.
+        v is S_B T_B / 2, T the interval; n and m are the samples of two blocks. The lag is from the
+        last sample of the earlier block to the first of the later one. The diagonal is
+        v (n (1 + p) / (1 - p) - 2 p (1 - p^n) / (1 - p)^2) / n^2.
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         x = 1.0 / (blocks.rate * self.T_B)

@@ -47,11 +47,11 @@ class Quantization(base.Term):
         return 3.0 * self.Q**2 / (n * interval) ** 2
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """Return (Q^2 / T^2) (2 - 2 cos(omega))."""
+        """Return (Q^2 / T^2) (2 - 2 cos(omega)); T: interval."""
         return self.Q**2 / interval**2 * 4.0 * np.sin(omega / 2.0) ** 2
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Return Q^2 / T^2 at lag 0, else 0: the sum is the last rounding error."""
+        """Return Q^2 / interval^2 at lag 0, else 0: the sum is the last rounding error."""
         return self.Q**2 / interval**2 * (lags == 0.0)
 
     def state_space(self, interval: float) -> StateSpace:
@@ -84,13 +84,14 @@ class Quantization(base.Term):
         return self.Q**2 * (last + (first + mean) ** 2 + mean**2)
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Return 2 Q^2 / d^2 at k = 0, -Q^2 / d^2 at k = 1, else 0."""
+        """Return 2 Q^2 / d^2 at lag 0, -Q^2 / d^2 at lag 1, else 0; d is ``block``."""
         return self.Q**2 / block**2 * (2.0 * (lags == 0.0) - (lags == 1.0))
 
     def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """Return 2 Q^2 / (n T)^2 on the diagonal, -Q^2 / (n m T^2) for touching blocks, else 0.
 
-        A block of n samples has the mean (q_stop - q_start) / (n T), with rounding errors q.
+        A block of n samples at intervals T has the mean (q_stop - q_start) / (n T), with rounding
+        errors q.
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         touching = np.zeros((len(n), len(n)))
@@ -124,19 +125,19 @@ class WhiteNoise(base.Term):
         return self.N**2 / tau
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Return N^2 / tau, for samples of variance N^2 / T."""
+        """Return N^2 / tau, for samples of variance N^2 / interval."""
         return self.N**2 / (n * interval)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """Return N^2 / T."""
+        """Return N^2 / interval."""
         return np.full_like(omega, self.N**2 / interval)
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Return -N^2 / (2 T) |k|: the sum is a random walk."""
+        """Return -N^2 / (2 interval) |lag|: the sum is a random walk."""
         return -0.5 * self.N**2 / interval * np.abs(lags)
 
     def state_space(self, interval: float) -> StateSpace:
-        """Return a model without states, with the measurement noise N^2 / T."""
+        """Return a model without states, with the measurement noise N^2 / interval."""
         return StateSpace.without_states(self.N**2 / interval)
 
     def continuous_space(self) -> ContinuousSpace:
@@ -174,15 +175,15 @@ class WhiteNoise(base.Term):
         return self.N**2 * time, self.N**2 * time**3 / 3.0
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Return N^2 / d at k = 0, else 0."""
+        """Return N^2 / block at lag 0, else 0."""
         return self.N**2 / block * (lags == 0.0)
 
     def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
-        """Return N^2 / (T count) on the diagonal, with count the samples present, else 0."""
+        """Return N^2 rate / count on the diagonal, else 0; count: samples present in a block."""
         return np.diag(self.N**2 / (1.0 / blocks.rate * blocks.count))
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw sums of variance n N^2 / T, with n the ``width``."""
+        """Draw sums of variance width N^2 rate."""
         return rng.standard_normal(blocks) * math.sqrt(width * self.N**2 * rate)
 
     def reading(self, lowest_tau: float) -> base.Reading:
@@ -211,20 +212,20 @@ class RandomWalk(base.Term):
         return self.K**2 * tau / 3.0
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Return K^2 tau / 3 (1 + 1 / (2 n^2))."""
+        """Return K^2 tau / 3 (1 + 1 / (2 n^2)), with tau = n interval."""
         return self.K**2 * n * interval / 3.0 * (1.0 + 0.5 / n**2)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
-        """Return K^2 T / (2 - 2 cos(omega))."""
+        """Return K^2 interval / (2 - 2 cos(omega))."""
         return self.K**2 * interval / (4.0 * np.sin(omega / 2.0) ** 2)
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
-        """Return K^2 T (|k|^3 - |k|) / 12."""
+        """Return K^2 T (|k|^3 - |k|) / 12; k: lag, T: interval."""
         k = np.abs(lags)
         return self.K**2 * interval / 12.0 * (k**3 - k)
 
     def state_space(self, interval: float) -> StateSpace:
-        """Return a model with Phi = 1 and Q_d = K^2 T, which starts at 0."""
+        """Return a model with Phi = 1 and Q_d = K^2 interval; the state starts at 0."""
         return StateSpace.scalar(1.0, self.K**2 * interval, 0.0)
 
     def continuous_space(self) -> ContinuousSpace:
@@ -254,13 +255,14 @@ class RandomWalk(base.Term):
         return self.K**2 * time**3 / 3.0, self.K**2 * time**5 / 20.0
 
     def block_covariance(self, lags: Array, block: float) -> Array:
-        """Return -K^2 d k / 2, and -K^2 d / 6 at k = 0."""
+        """Return -K^2 d k / 2, and -K^2 d / 6 at k = 0; k: lag, d: ``block``."""
         return -(self.K**2) * block * np.where(lags == 0.0, 1.0 / 6.0, 0.5 * lags)
 
     def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """Return K^2 times the mean time of the earlier block.
 
-        The diagonal is K^2 T (start + (n - 1) (2 n - 1) / (6 n)), for blocks of n samples.
+        The diagonal is K^2 T (start + (n - 1) (2 n - 1) / (6 n)), for blocks of n samples at
+        intervals T, with start counted from the first block.
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         first = (blocks.start - blocks.start[0]).astype(np.float64)

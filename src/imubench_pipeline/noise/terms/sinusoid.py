@@ -38,12 +38,12 @@ class Sinusoid(Deterministic):
         return self.amplitude**2 * (np.sin(x) ** 2 / x) ** 2
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
-        """Return amplitude^2 sin^4(n x) / (n sin(x))^2 with x = pi f_0 T."""
+        """Return amplitude^2 sin^4(n x) / (n sin(x))^2 with x = pi f_0 interval."""
         x = math.pi * self.frequency * interval
         return self.amplitude**2 * np.sin(n * x) ** 4 / (n * math.sin(x)) ** 2
 
     def state_space(self, interval: float) -> StateSpace:
-        """Return a rotation by 2 pi f_0 T per sample; the initial phase is not known."""
+        """Return a rotation by 2 pi f_0 interval per sample; the initial phase is not known."""
         angle = 2.0 * math.pi * self.frequency * interval
         cosine, sine = math.cos(angle), math.sin(angle)
         return StateSpace(
@@ -90,7 +90,8 @@ class Sinusoid(Deterministic):
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
         """Return A^2 / 2 times the gains of both blocks and the cosine of their phase difference.
 
-        A is the amplitude, w = 2 pi f_0, and a gain sin(n w T/2) / (n sin(w T/2)).
+        A is the amplitude, w = 2 pi f_0. The gain of a block of n samples at intervals T is
+        sin(n w T/2) / (n sin(w T/2)).
         """
         n = (blocks.stop - blocks.start).astype(np.float64)
         half = math.pi * self.frequency * (1.0 / blocks.rate)

@@ -135,7 +135,7 @@ class ArrayFile(LogFile):
             if count:
                 yield block
         if read == 0:
-            raise UnusableError("no record; expected at least one")
+            raise UnusableError("no rows; expected at least one: the log is empty, record it again")
         promised = tables[0].rows
         if promised is not None and read != promised:
             raise UnusableError(f"cut short: {read} of {promised} records; copy it again")
