@@ -165,7 +165,6 @@ def read_sigma(sensor: Sensor, quantity: str, figure: str) -> float | None:
 
 
 def _list_statements(sensor: Sensor, channel: str, figure: str) -> Iterator[float]:
-    """Yield the standard deviation, SI, of each statement on an axis."""
     datasheet = _with_options(sensor.datasheet)
     if figure in _NOISE:
         by_figure: dict[int, list[Comparable]] = {}
@@ -204,7 +203,6 @@ def _with_options(datasheet: Datasheet) -> Datasheet:
 
 
 def _temperature_span(sensor: Sensor) -> float:
-    """Return the width of the temperature range of operation, K."""
     if sensor.temperature_range is None:
         return _UNKNOWN_RANGE
     low, high = (parse_quantity(text, "temperature") for text in sensor.temperature_range)

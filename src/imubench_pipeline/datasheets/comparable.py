@@ -90,7 +90,8 @@ class PrintedAxis:
         """Return the figures of a name for this axis, as copies of ``like`` with values.
 
         ``convert`` gives values in SI; ``figures`` are by default all printed under this name.
-        Figures of options that are not logged are returned only if there are no others.
+        Figures of options (settings of the sensor) that are not logged are returned only if no
+        other figure is printed.
         """
         listed = [
             figure
@@ -145,7 +146,7 @@ class PrintedAxis:
         return None
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
-        """Return ``like`` with the reason why no figure of these names is printed."""
+        """Return ``like`` with the reason for its missing value: no figure ``names`` is printed."""
         looked_up = any(self.sheet.looked_up(name) for name in names)
         return replace(like, reason=texts.unpublished(looked_up=looked_up), looked_up=looked_up)
 
@@ -188,8 +189,8 @@ def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
-    The offset is always yielded, other figures if they are published. Of these others, only the
-    temperature coefficient is comparable with a log.
+    The offset is always yielded, other figures if they are published. Apart from the offset, only
+    the temperature coefficient is comparable with a log.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)

@@ -40,7 +40,7 @@ KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[CoverageRow]:
-    """Return a row per sold sensor, quantity and figure: whether the figure is published."""
+    """Return whether each figure is published: a row per sensor for sale, quantity and figure."""
     rows = []
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet

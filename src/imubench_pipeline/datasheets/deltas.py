@@ -182,7 +182,7 @@ def deltas(
     """Compare an estimate, SI, with a datasheet: one row for each interpretation of its figures.
 
     ``tau``, shape (m,), s, are the averaging times at which the curve is accurate enough to find
-    its minimum. ``tolerance`` is the largest relative difference with the verdict ``as printed``.
+    its minimum. ``tolerance`` is the largest relative difference that is ``as printed``.
     """
     for entry in read_comparables(datasheet, channel):
         yield compare(entry, get_measured(entry, estimate, tau), tolerance)
@@ -269,7 +269,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
-    """Return the verdict on one value by its position relative to a printed figure."""
     assert entry.figure is not None and entry.value is not None
     if entry.figure.kind in ("max", "range"):
         if value > entry.value:
@@ -304,10 +303,10 @@ def curve_rms(
 ) -> list[CurveRms]:
     """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
 
-    The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
-    line is used alone. A density of unknown sidedness gives two curves. Typical figures are
-    preferred. ``printed``: figures of a channel; ``tau`` and ``adev``, shape (m,): s, and measured
-    Allan deviation above 0, rad/s or m/s².
+    The lines add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one line, that one
+    is used. If N may be one-sided or two-sided, there are two results. Typical figures are
+    preferred. ``printed`` are the figures of a channel; ``adev`` is the measured Allan deviation
+    above 0, rad/s or m/s², at ``tau``, s; both have shape (m,).
     """
     noises: list[Comparable | None] = [*_select_typical(printed, "N")]
     floors: list[Comparable | None] = [*_select_typical(printed, "adev_minimum")]

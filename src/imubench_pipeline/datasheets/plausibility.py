@@ -267,7 +267,6 @@ def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
 
 
 def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
-    """Yield a finding if the norm of the mean acceleration is not gravity."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     if not set(axes) <= channels.keys():
         return

@@ -89,7 +89,7 @@ def suspicious(
     usual: UsualFigures,
     printed: Mapping[str, float] | None = None,
 ) -> list[UnusualFigure]:
-    """Return a finding for each figure that is 20 times too large or small, with a likely unit.
+    """Return a finding for each figure that is 20 times too large or small, and the likely unit.
 
     The figures are N and B, printed or estimated, SI. A figure is too large above 20 times the
     median of the catalogue (`usual_figures`). It is too small below a twentieth of the least of the
@@ -122,7 +122,7 @@ def suspicious(
 def unusual_rows(
     parameters: Iterable[ParameterRow], sensors: Mapping[str, Sensor], usual: UsualFigures
 ) -> Iterator[FindingRow]:
-    """Yield rows of ``findings`` about estimates far from all printed figures."""
+    """Yield rows of ``findings`` on estimates of N and B far from all printed figures."""
     for row in parameters:
         # Vendors print the minimum of the Allan deviation as B.
         figure = {"N": "N", "sigma_min": "B"}.get(row.parameter)
