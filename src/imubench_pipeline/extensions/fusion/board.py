@@ -35,7 +35,7 @@ class Parts:
     sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: Array) -> tuple[Array, Array]:
-        """Return independent and shared variance of the sum with weights, (n,); SI^2, (m,) each."""
+        """Return independent and shared variance, SI^2, (m,) each, of a weighted sum of sensors."""
         alone = np.sum(self.own * weights**2, axis=1)
         return alone, np.sum(self.shared * (self.sensitivities @ weights) ** 2, axis=1)
 
@@ -80,7 +80,7 @@ class Board:
         rate: float,
         correlation: Mapping[str, float] | None = None,
     ) -> "Board":
-        """Return a board of equal sensors, at a rate in Hz; ``correlation`` as in `divided`."""
+        """Return a board of ``number`` equal sensors; rate in Hz; correlation as in `divided`."""
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []
         return cls([own] * number, [rate] * number, shared)
@@ -128,9 +128,9 @@ class Board:
 def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:
     """Split the noise of a sensor into an independent part and one shared by all specimens.
 
-    ``correlation`` has the shared fraction of the variance of N, B, K and R, 0 to 1, or
-    ValueError. The fraction of B applies to further Gauss-Markov processes, too. Quantization and
-    lines are independent.
+    ``correlation`` has the shared fraction of the variance of N, B, K and R, 0 to 1; ValueError
+    for another name or value. The fraction of B also applies to further Gauss-Markov processes.
+    Quantization and lines are independent.
     """
     for name, value in correlation.items():
         if name not in _SHARED_PARAMETERS or not 0.0 <= value <= 1.0:

@@ -41,8 +41,8 @@ def answer(
 ) -> Answer | str:
     """Return the Allan variance of a sensor's median channel at a tau, s; or why there is none.
 
-    The candidates are all channels of one quantity; simulated ones are left out beside measured
-    ones. ``correlation``: shared fraction of the variance of each parameter; ``longest``: largest
+    The candidates are all channels of one quantity; if any is measured, simulated ones are left
+    out. ``correlation``: shared fraction of the variance of each parameter; ``longest``: largest
     tau as a fraction of the log; ``draws``: number of models drawn from the estimate.
     """
     measured = [channel for channel in candidates if not channel.simulated] or candidates

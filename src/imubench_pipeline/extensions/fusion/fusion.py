@@ -47,9 +47,10 @@ def _yield_printed(datasheet: Datasheet, channel: str) -> Iterator[tuple[str | N
 def yield_grade_rows(
     candidates: Iterable[ComparedChannel], grades: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Yield the rows of ``grades``: each sensor, by its axis of median N, and printed figure.
+    """Yield the rows of ``grades``: a row per sensor and printed figure of a better class.
 
-    `grades`: the sensors of the better class, by their names in the catalogue.
+    A sensor is represented by its axis of median N. `grades` has the sensors of the better class by
+    their names in the catalogue.
     """
     by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
     for channel in candidates:

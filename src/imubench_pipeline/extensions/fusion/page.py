@@ -28,7 +28,7 @@ class PairLine:
 
 @dataclass(frozen=True)
 class PairMatrix:
-    """The pairs of a quantity and an averaging time; cells by row sensor and column sensor."""
+    """The pairs of sensors for a quantity and a tau; cells by row sensor and column sensor."""
 
     name: str
     symbol: str
@@ -94,7 +94,7 @@ def describe_common_errors(common: Mapping[str, float]) -> str:
 
 
 def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[PairLine]:
-    """Yield the lines of the table: pairs whose first sensor is the noisier one, or unknown."""
+    """Yield lines of the table of pairs: the noisier sensor is first; unknown pairs occur once."""
     for row in rows:
         if row.adev is not None and row.other_adev is not None:
             if row.adev <= row.other_adev:
@@ -156,7 +156,7 @@ def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[GradeLine]:
 
 
 def find_unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
-    """Return the sensors of the class without printed figures of a quantity, and the reasons."""
+    """Return the reason for each sensor of the class that prints no figure of a quantity."""
     groups: dict[tuple[str, str], list[GradeRow]] = {}
     for row in rows:
         groups.setdefault((row.quantity, row.grade_name), []).append(row)
@@ -233,7 +233,6 @@ def _make_boards_context(site: Site) -> Mapping[str, object]:
 
 
 def _select_recordings(site: Site, board: str) -> list[RecordingView]:
-    """Return the recordings of a board that could be analysed."""
     of_board = site.settings["boards"][board]["sensors"]
     return [
         view
@@ -270,7 +269,7 @@ class PublishedLine:
 
 
 def make_published_line(row: PublishedFigureRow) -> PublishedLine:
-    """Return the line of a printed figure."""
+    """Return the line of the table that compares a published figure with ours."""
     quantity = row.channel.split("_")[0]
     ours = row.datasheet if row.of == "datasheet" else row.value
     ratio = ours / row.means if ours and row.means else None

@@ -14,9 +14,10 @@ _MIN_VARIANCE_RATIO = 1e-14  # of a sensor without noise, over the noisiest one
 def best_weights(board: Board, tau: float | None = None) -> Array:
     """Return the constant weights, shape (n,), of least Allan variance at a tau, s.
 
-    Without tau, N^2 is minimised. The weights are then as N^-2, if the sensors share no noise;
-    else a weight may be negative: a sensor more sensitive to the shared noise compensates others.
-    The tau is rounded to whole fused samples. Raises ValueError for a sensor without noise.
+    Without tau, N^2 is minimised: if the sensors share no noise, weights are in proportion to N^-2.
+    If they share noise, a weight may be negative: a sensor that is more sensitive to this noise
+    compensates the other sensors. The tau is rounded to whole fused samples. Raises ValueError for
+    a sensor without noise.
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])
@@ -30,10 +31,11 @@ def best_weights(board: Board, tau: float | None = None) -> Array:
 
 
 def least(parts: Parts) -> Array:
-    """Return the weights of least variance with a sum of 1, shape (m, n), at m tau.
+    """Return the weights with sum 1 that have the least variance at each of m tau, shape (m, n).
 
-    The model is y = 1 x + G c + e, with x unknown, and c the shared processes with unit variance.
-    The normal equations are well conditioned if the mean of G is treated separately.
+    The model of the readings y is y = x + G c + e, with the signal x, shared processes c of unit
+    variance, their sensitivities G, and independent noise e. The normal equations are well
+    conditioned if the mean of G is treated separately.
     """
     # A sensor without independent noise is nearly perfect; if none has any, all are equal.
     largest = parts.own.max(axis=1, keepdims=True)
