@@ -26,10 +26,10 @@ MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
-    """Decorrelate columns of block means, shape (b, c): return L^-1 columns, same shape.
+    """Decorrelate ``columns`` of block means, shape (b, c): return L^-1 columns, same shape.
 
-    L L^T is the covariance of block means of the model, which must have noise in every sample.
-    Raises ValueError if a mean has no noise, given the means before it.
+    L L^T is the covariance of the block means by the model. Raises ValueError if a mean follows
+    exactly from the means before it: the model needs noise in every sample.
     """
     states = discretise_blocks(model, blocks, turn_on_bias=0.0)
     innovations = _compute_innovations(

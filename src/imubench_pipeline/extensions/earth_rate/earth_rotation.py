@@ -136,7 +136,6 @@ def _published(
 def _start_row(
     key: Key, declared: TwoPosition, source: NoiseSource | None = None
 ) -> partial[EarthRateRow]:
-    """Return the columns that all rows of the table ``earth_rate`` share."""
     return partial(
         EarthRateRow,
         **asdict(key),
@@ -341,13 +340,11 @@ def _estimates(
 def _without(
     row: partial[EarthRateRow], part: str, status: str, reason: str
 ) -> Iterator[EarthRateRow]:
-    """Yield the rows of a part without estimates."""
     for method in METHODS:
         yield row(part=part, method=method, status=status, reasons=(reason,))
 
 
 def _series(key: Key, part: str, courses: Courses, begins: float) -> Iterator[EarthRateSeriesRow]:
-    """Yield the rows of the table ``earth_rate_series``."""
     rates = [("rate", course) for course in courses.courses]
     for quantity, course in [*rates, ("drift", courses.drift)]:
         for k in thin(len(course.time)):

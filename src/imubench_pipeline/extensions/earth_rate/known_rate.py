@@ -108,7 +108,7 @@ def _run_filter(
 
 
 def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
-    """Return after what time, s, a mean, shape (n,), stays near the known rate; inf: not yet."""
+    """Return the time, s, from which a mean, (n,), stays near the known rate; else inf."""
     out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
     if len(out) == 0:
         return 0.0
@@ -120,8 +120,8 @@ def mean_sigma(
 ) -> Array:
     """Return the exact sigma of the mean of `track` after each sample, rad/s, shape (n,).
 
-    It includes the noise of the model, and a fixed bias with the sigma ``turn_on_bias``, rad/s. The
-    start is in (rad/s)^2, the rate in Hz. Raises ValueError as `track`.
+    It includes the noise of the model, and a fixed bias with the sigma ``turn_on_bias``, rad/s.
+    ``start`` is as in `track`, in (rad/s)^2; the rate is in Hz. Raises ValueError as `track`.
     """
     one = _build_filter(model, rate)
     decay, of_f, of_rrw, white = one.decay, one.of_f, one.of_rrw, one.white

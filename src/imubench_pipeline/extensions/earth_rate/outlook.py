@@ -70,7 +70,7 @@ class DwellCurve:
 
     @property
     def nearly_best(self) -> NDArray[np.bool_]:
-        """Whether a dwell, and each one between it and the best, loses 1 % at most, shape (k,)."""
+        """Whether each dwell, and all between it and the best one, lose 1 % at most, shape (k,)."""
         worse = self.sigma > (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
         stretch = np.cumsum(worse)
         return np.asarray((stretch == stretch[self.best]) & ~worse)
@@ -310,7 +310,6 @@ def _predict_alignment(
 
 
 def _find_bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
-    """Return the standard deviation of the fixed bias in SI, and its source."""
     dimension = QUANTITIES[quantity]
     sheet: QuantityDatasheet | None = getattr(printed, quantity)
     for name, kind in product(("bias_repeatability", "offset"), _TYPICAL_KINDS):

@@ -253,7 +253,6 @@ def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> Needs | None:
 
 
 def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
-    """Return which dwells are nearly as good as the best, in a sentence."""
     near = [*nearly, best]
     low, high = (number_text(limit, 3) for limit in (min(near), max(near)))
     if best in (max(tried), min(tried)):
@@ -274,7 +273,6 @@ _MAX_SMALL_HEADING = 0.5  # rad; largest sigma of a heading for which the small-
 def _pack_figures(
     view: RecordingView, rows: Sequence[EarthRateRow], turning: Sequence[TurningRow], arrays: Arrays
 ) -> Json:
-    """Return the data of the figures of dwells and estimates."""
     dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
     series = view.rows(EarthRateSeriesRow)
     parts: Json = {}
@@ -415,7 +413,6 @@ NOT_FOUND = Section(
 
 
 def _format_parts(view: RecordingView) -> Iterator[dict[str, EarthRateLine]]:
-    """Yield the estimates from each part of a recording, by method."""
     shown = [row for row in view.rows(EarthRateRow) if row.method in ESTIMATES]
     for part in dict.fromkeys(row.part for row in shown):
         yield {row.method: format_estimate(row) for row in shown if row.part == part}
@@ -458,7 +455,6 @@ def describe_published(rows: Sequence[EarthRatePublishedRow]) -> str:
 
 
 def _describe_gain(rows: Sequence[EarthRatePublishedRow]) -> str:
-    """Return the improvement of a filter over the mean of pairs, in a sentence."""
     gains = [
         1.0 - row.sigma_filter / row.sigma
         for row in rows
@@ -521,7 +517,6 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
 
 
 def _describe_missing_axes(row: AlignmentRow) -> str:
-    """Return which axes are missing in the log and replaced by others, in a sentence."""
     lent_axes = []
     for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
         pairs = zip("xyz", channels, strict=True)
@@ -534,7 +529,6 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
 
 
 def _describe_check(rows: Sequence[AlignmentRow]) -> str:
-    """Return the check of the standard deviations by simulated triads, in a sentence."""
     comparisons = []
     for row in rows:
         if row.simulated is None:

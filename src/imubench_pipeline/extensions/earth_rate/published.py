@@ -70,7 +70,10 @@ class Courses:
 
 
 def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return the least sigma by white noise, N / sqrt(T) / cos(latitude), rad/s, T s in blocks."""
+    """Return sigma of the rate by white noise alone, N / sqrt(T) / cos(latitude), rad/s.
+
+    T is the total time in blocks, s.
+    """
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
 
@@ -209,23 +212,23 @@ class PrintedRun:
 
 
 def compute_needed_drift(off: float, period: float, latitude: float) -> float:
-    """Return the bias drift, rad/s^2, that explains an error, rad/s; ``period``: of turns, s."""
+    """Return the bias drift, rad/s^2, that explains an error ``off``, rad/s; period of turns, s."""
     return -2.0 * math.cos(latitude) * off / period
 
 
 def compute_needed_angle(off: float, dwell: float, latitude: float) -> float:
-    """Return the turning, rad, left in each dwell, s, that would explain an error, rad/s."""
+    """Return the angle of turning in each dwell, rad, that explains an error ``off``, rad/s."""
     return off * dwell * math.cos(latitude)
 
 
 def compute_wrong_share(value: float, true: float) -> float | None:
-    """Return the fraction of a run whose wrong sense would explain a value; None if none does."""
+    """Return the fraction of a run with inverted sense that explains a value; None if none does."""
     part = 0.5 * (1.0 - value / true)
     return part if 0.0 <= part <= 1.0 else None
 
 
 def compute_needed_heading(value: float, true: float) -> float | None:
-    """Return the angle of axis to meridian, rad, that explains a value; None if no angle does."""
+    """Return the angle between axis and meridian, rad, that explains a value; None if none does."""
     return math.acos(value / true) if abs(value) <= abs(true) else None
 
 
@@ -243,7 +246,7 @@ class WarmUp:
 
 
 def fit_warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
-    """Fit a warm-up to the mean drifts, rad/s^2, before and in a run's last part; None if none."""
+    """Fit a warm-up to mean drifts, rad/s^2, before and in the last part; None if none fits."""
     if not 0.0 < last / first < 1.0:
         return None
     rest = duration - last_duration
@@ -262,7 +265,7 @@ def fit_warm_up(first: float, last: float, duration: float, last_duration: float
 
 
 def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
-    """Return the least misfit, in sigma, if the senses are wrong from a single turn on."""
+    """Return the least misfit, in sigma, if all senses after one turn are inverted."""
     first = whole.without(last)
     flips = np.linspace(0.0, whole.duration, 6001)
     before = np.clip(flips / first.duration, 0.0, 1.0)
@@ -278,7 +281,7 @@ def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> flo
 
 
 def fit_clock_error(parts: Sequence[PrintedRun], period: float, true: float) -> tuple[float, float]:
-    """Return the best relative clock error up to 1/20, and its misfit in sigma; period in s."""
+    """Return the relative clock error, up to 1/20, that fits best, and the misfit in sigma."""
     errors = np.linspace(0.0, 0.05, _TESTED_CLOCK_ERRORS)
     edges = np.cumsum([0.0, *(part.duration for part in parts)])
     squares = np.zeros(_TESTED_CLOCK_ERRORS)

@@ -112,7 +112,7 @@ def simulate_log(
 
 
 def compute_true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
-    """Return error-free readings, rad/s, shape (samples,); ``transient``: pulse peaks of turns."""
+    """Return error-free readings, rad/s, shape (samples,); ``transient``: peak in each turn."""
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
     seen = earth_rate * math.cos(experiment.latitude)

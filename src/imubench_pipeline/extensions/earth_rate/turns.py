@@ -107,7 +107,6 @@ def average_log_blocks(
 
 
 def _estimate_sigma(residual: Array) -> float:
-    """Return the standard deviation without outliers."""
     calm = np.abs(residual)
     sigma = math.inf
     for _ in range(4):
@@ -185,7 +184,6 @@ def _find_edges(z: Array, first: int, last: int) -> tuple[int, int]:
 def _merge_events(
     blocks: LevelBlocks, log: Array, rate: float, stretches: list[tuple[int, int, float]]
 ) -> Iterator[Event]:
-    """Yield the events, adjacent stretches merged, with peak and duration."""
     joined: list[tuple[int, int, float]] = []
     for first, last, likelihood in stretches:
         if joined and first - joined[-1][1] < _MAX_CALM_BLOCKS:
@@ -281,7 +279,7 @@ _WHITE_VARIANCE_RATIO = 16.0 / 6.0
 
 @dataclass(frozen=True)
 class Alternation:
-    """Mean of the dwells of the first sense less the mean of both senses."""
+    """Mean of the dwells of the first sense minus the mean of both senses (north and south)."""
 
     # value, sigma: rad/s; the difference, and its standard error
     value: float
@@ -414,7 +412,7 @@ def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, flo
 def find_best_shift(
     blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
-    """Return the delay of turns, s, with the largest alternation, and z with and without delay.
+    """Return the delay of turns, s, with the largest alternation; z with, and z without delay.
 
     All shifts, up to ``longest``, s, share one standard error, so that z^2 is twice the
     log-likelihood. The turns are the scheduled ones (see `split_at_turns`).
