@@ -72,7 +72,7 @@ def make_calibration_tables(
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
     `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
-    `settings`: of `run.plan.Plan.experiment_settings`. A rejected recording has no rows.
+    `settings`: from `run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
     tables: dict[str, list[TableRow]] = {name: [] for name in CALIBRATED}
     logs = load_logs(folder)
@@ -250,7 +250,6 @@ def _average_positions(
 def _calibrate_gyro(
     row: partial[CalibrationRow], gyro: GyroLog, declared: OnRateTable | AtRest
 ) -> Iterator[TableRow]:
-    """Yield the rows of a gyro, or the reason without them."""
     axis = declared.axis if isinstance(declared, OnRateTable) else declared
     pointing = None if axis is None else axis.pointing
     if gyro.source is not None:
@@ -343,7 +342,6 @@ def _on_rate_table(
 
 
 def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
-    """Return the steady rates in samples of the log; ValueError where there are none."""
     log, settling = gyro.log, declared.si("settling", "time")
     if not declared.steps:
         if not log.table_rate:
@@ -412,7 +410,6 @@ def _open(
 
 
 def _without(row: partial[CalibrationRow], status: str, reason: str) -> Iterator[CalibrationRow]:
-    """Yield the rows of a run without estimates."""
     for name in _RUN_PARAMETERS[row.keywords["run"]]:
         yield row(status=status, reason=reason, parameter=name, unit=UNITS[name])
 

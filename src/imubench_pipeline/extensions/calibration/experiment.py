@@ -158,7 +158,7 @@ class Blocks(SampleBlocks):
         return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def of_dwells(self) -> "Blocks":
-        """Return one block per dwell, from the first sample of its blocks to the last."""
+        """Return one block per dwell, which covers all blocks of the dwell."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         last = np.append(first[1:], len(self)) - 1
         count = np.add.reduceat(self.count, first)

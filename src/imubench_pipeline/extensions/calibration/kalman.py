@@ -52,11 +52,11 @@ class Filtered:
         return np.asarray((self.innovation / self.innovation_sigma) ** 2)
 
     def rate_nees(self, rate: float) -> Array:
-        """Return the squared error of the rate over its variance, shape (runs, b): chi^2(1)."""
+        """Return the squared error of the rate divided by its variance, (runs, b): chi^2(1)."""
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
-        """Return the NEES, (runs, b), chi^2(m + 1), by the truth; ``states``: (runs, b, m)."""
+        """Return the NEES, (runs, b), chi^2(m + 1), from true rate and ``states``, (runs, b, m)."""
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
         error[:, :, 1:] -= states

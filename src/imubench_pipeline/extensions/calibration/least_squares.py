@@ -175,8 +175,8 @@ def halve_block_length(
 ) -> int:
     """Halve a block length, in samples, until shorter blocks give no more information.
 
-    A fourth of the returned length would lower none of the standard errors ``sigma`` by 0.1 %, or
-    would give more than ``max_blocks`` blocks. The function ``sigma`` takes the blocks.
+    With a fourth of the returned length, no standard error would be 0.1 % lower, or there would be
+    more than ``max_blocks`` blocks. ``sigma`` returns the standard errors for given blocks.
     """
 
     @cache

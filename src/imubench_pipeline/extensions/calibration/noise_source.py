@@ -91,7 +91,7 @@ def load_noise_at_rest(folders: Sequence[Path]) -> NoiseAtRest | None:
 
 
 def lend_axes(channels: Collection[str]) -> dict[str, str]:
-    """Return for each axis the channel whose model it uses: its own, or another of the quantity.
+    """Return for each axis the channel whose noise model it uses: its own, or one of its quantity.
 
     Axes of a quantity without channels are left out.
     """

@@ -56,7 +56,7 @@ class Pointing:
 
     @property
     def tilt_sigma(self) -> float:
-        """Effect of ``elevation_sigma`` on the rate at the worst heading, first order, rad/s."""
+        """Effect of ``elevation_sigma`` on the rate at the worst heading, to first order, rad/s."""
         most = abs(math.cos(self.latitude) * math.sin(self.elevation))
         most += abs(math.sin(self.latitude) * math.cos(self.elevation))
         return EARTH_RATE * most * self.elevation_sigma

@@ -160,7 +160,6 @@ def _make_term(fit: Fit, scale: Array | float = 1.0) -> Estimated:
 
 
 def _compute_linearity(line: Fit, each: Fit, rates: Array) -> Estimated:
-    """Return the largest deviation of a rate from the line, from a fit of each rate."""
     at_rates = np.column_stack([np.ones(len(rates)), rates])
     largest = float(np.abs(rates).max())
     size = np.abs(each.value - line.value @ at_rates.T) / largest
@@ -208,7 +207,7 @@ def calibrate(
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of steady rates from the line."""
+    """Residuals of the mean reading at each steady rate from the fitted line."""
 
     dwell: NDArray[np.int64]  # shape (k,); index in the schedule, from 0
     mean: Array  # shape (k,); mean reading, rad/s
@@ -228,7 +227,7 @@ def residuals(
     model: NoiseModel,
     setting_sigma: float = 0.0,
 ) -> Residuals:
-    """Return the residuals of each steady rate, for a calibration of one run.
+    """Return the residual of each steady rate from the line of a calibration of one run.
 
     ``rates`` is the rate of table and Earth in each block, shape (b,), rad/s; ``setting_sigma`` is
     the standard deviation of the true rate about the stated one, rad/s.

@@ -58,8 +58,9 @@ def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, 
 def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
     """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
 
-    ``attitude``, shape (3, 3), is of the first position; ``angle`` the turn from it about z, rad,
-    and ``turning`` its rate, rad/s, shape (n,). Turns cause no acceleration of the accelerometers.
+    ``attitude``, shape (3, 3), is the attitude in the first position. ``angle``, rad, is the angle
+    turned about z since then, and ``turning``, rad/s, its rate, shape (n,) each. Turns cause no
+    acceleration of the accelerometers.
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = []

@@ -105,9 +105,10 @@ def _build_step(space: StateSpace, gap: int, size: int) -> Step:
 class BlockFilter:
     """A Kalman filter of the block means of several axes, for any number of runs at once.
 
-    ``seen``, shape (b, a, p), is the sensitivity of the mean of each of a axes over each of b
-    blocks to p constants; ``start``, shape (p, p), a root of their prior covariance. The roots have
-    the shapes (b, n, n) of states and (b, a, a) of innovations, the gains (b, n, a).
+    ``seen``, shape (b, a, p), is the sensitivity of the block means (b blocks, a axes) to p
+    constants. ``start``, shape (p, p), is a root of the prior covariance of the constants.
+    The roots of the covariances have the shapes (b, n, n) for states and (b, a, a) for innovations;
+    the gains have the shape (b, n, a).
     """
 
     def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:

@@ -50,7 +50,7 @@ def simulate_triad(
     runs: int,
     rng: np.random.Generator,
 ) -> TriadRuns:
-    """Draw the block means of many runs; ``attitude``, shape (3, 3), is of the first position."""
+    """Draw the block means of many runs; ``attitude``, shape (3, 3): in the first position."""
     drawn = [
         simulate_runs(
             model, positions.blocks, earth_rate=0.0, turn_on_bias=bias, runs=runs, rng=stream

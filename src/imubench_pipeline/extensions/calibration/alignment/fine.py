@@ -78,7 +78,7 @@ class FineAlignment:
 
     @property
     def not_observable(self) -> tuple[NotObservable, ...]:
-        """The heading, if its standard deviation is at least that of a uniform distribution."""
+        """The heading, if its standard deviation is as large as for an unknown heading; or none."""
         if self.sigma[-1, 2] < UNIFORM_HEADING_SIGMA:
             return ()
         reason = (
