@@ -104,7 +104,6 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
 
 
 def _calibrate(options: argparse.Namespace, program: "Program", compiling: "Compilation") -> int:
-    """Write the file of one IMU; return the exit status."""
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.request import build_imu
     from imubench_pipeline.run.analysis.chain import Analysis
@@ -143,7 +142,6 @@ def _calibrate(options: argparse.Namespace, program: "Program", compiling: "Comp
 
 
 def _describe_file(imu: "Imu", program: "Program", path: Path) -> Iterator[str]:
-    """Yield what a file holds: its mode, and the values of gyro and accelerometer."""
     from imubench_pipeline.extensions.exports.mapping import map_to_family
     from imubench_pipeline.extensions.exports.reasons import value_kind
     from imubench_pipeline.report.practical import choose_page_unit
@@ -163,7 +161,6 @@ def _describe_file(imu: "Imu", program: "Program", path: Path) -> Iterator[str]:
 
 
 def _describe_logs(tables: "Mapping[str, pa.Table]") -> Iterator[str]:
-    """Yield the state of each log, and the events that matter most."""
     from imubench_pipeline.model.estimates import AllanRow, ParameterRow
     from imubench_pipeline.model.recordings import FindingRow, RecordingRow
     from imubench_pipeline.report import terminal

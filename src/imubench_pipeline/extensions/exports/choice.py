@@ -134,7 +134,7 @@ def choose(
 def pool_recordings(
     rows: Iterable[ParameterRow], choice: Choice, method: str | None = None
 ) -> Choice:
-    """Replace the model of a chosen channel by the mean of its spectra in all recordings.
+    """Replace the model of the chosen channel by its mean spectrum over all recordings.
 
     All ``rows`` are of one device; ``method`` as for `choose`. N^2, K^2 and B^2 are averaged.
     """
@@ -167,7 +167,7 @@ def pool_recordings(
 
 
 def parameter_notes(estimate: Estimate, determined: bool = True) -> list[str]:
-    """Return notes on parameters that are not plainly estimated: which value or limit is used.
+    """Return a note on each parameter at a bound or without a value: which value or limit is used.
 
     ``determined``: whether a slow term has a value; else the slow terms are not used.
     """

@@ -180,7 +180,6 @@ def _read_catalogue() -> Mapping[str, Sensor]:
 
 
 def _build_from_datasheet(options: argparse.Namespace) -> "Imu":
-    """Return the noise by the printed figures of a sensor of the catalogue."""
     from imubench_pipeline.extensions.exports.from_datasheet import build_printed_imu
     from imubench_pipeline.extensions.exports.imu import ExportError
     from imubench_pipeline.extensions.exports.modes import apply_mode, choose_mode

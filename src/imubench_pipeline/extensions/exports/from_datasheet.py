@@ -22,7 +22,7 @@ def build_printed_imu(
     because: str | None = None,
     rate: float | None = None,
 ) -> Imu:
-    """Return the noise by a datasheet; figures that it does not print are the worst of the class.
+    """Return the noise of a sensor by its datasheet, with missing figures the worst of the class.
 
     ``horizon`` is in s, ``rate`` in Hz, by default the highest of the sensor. Raises ExportError
     without a rate.

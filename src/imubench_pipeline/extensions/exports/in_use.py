@@ -42,8 +42,9 @@ class InUseNoise:
 def measure_in_use(samples: Array, rate: float, cutoff: float = MOTION_CUTOFF) -> InUseNoise:
     """Return the broadband noise and the lines of samples of shape (L,), SI, at a rate in Hz.
 
-    Missing samples are NaN; parts of 4 s or more between them are used. All noise below ``cutoff``,
-    Hz, is motion. ExportError if these parts have less than 32 s, or the rate is too low.
+    Missing samples are NaN; parts of 4 s or more without a gap are used. All noise below
+    ``cutoff``, Hz, counts as motion. Raises ExportError if the used parts have less than 32 s, or
+    the rate is too low.
     """
     size = max(int(_SEGMENT * rate), 2 * _MIN_BAND)
     present = np.concatenate(([False], np.isfinite(samples), [False]))

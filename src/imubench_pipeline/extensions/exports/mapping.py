@@ -80,9 +80,9 @@ def as_process(
 
 
 def find_common_time(models: Sequence[NoiseModel], horizon: float, *, walk: bool = False) -> float:
-    """Return the T_B, s, for which replacing each model by one process has the least error.
+    """Return the T_B, s, of least error if each model is replaced by white noise and one process.
 
-    The error is the one of `as_process`. T_B is the horizon, s, if no model has a slow term.
+    `as_process` defines the error. T_B is the horizon, s, if no model has a slow term.
     """
     slow = [(model.N, terms) for model in models if (terms := _select_slow_terms(model, walk=walk))]
     own = {term.gauss_markov and term.gauss_markov.T_B for _, terms in slow for term in terms}
@@ -166,7 +166,6 @@ def _describe_replacement(
     horizon: float,
     rate: float,
 ) -> Mapped:
-    """Return a replacement with its description and the error of its Allan deviation."""
     noise = replace(model, Q=0.0, sinusoids=())
 
     def error(tau: Array) -> Array:

@@ -24,7 +24,7 @@ Densities = Mapping[str, tuple[float, float]]  # N and K of gyro and accel, SI
 
 @dataclass(frozen=True)
 class Floor:
-    """Least noise in use, as recommended by a program's authors, if there is no log in use."""
+    """Least noise in use that a program's authors recommend; it applies without a log in use."""
 
     source: str
     factor: float = 1.0  # on all densities at rest

@@ -65,14 +65,14 @@ _ROUNDING_MARGIN = 1e-9
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits that a model must not lie below, such as an Allan variance at several tau."""
+    """Lower limits on a quantity of a model, such as its Allan variance at several tau."""
 
     x: Array  # shape (m,); tau or time, s, or frequency, Hz
     value: Array  # shape (m,); lower limit there
     of_term: Callable[[noise.Term], Array]  # contribution of a term to the limited quantity at `x`
 
     def ratio(self, model: noise.NoiseModel) -> Array:
-        """Return the ratio of the limited quantity of a model to its limit, shape (m,)."""
+        """Return the quantity of a model divided by its limit, shape (m,)."""
         return np.asarray(np.sum([self.of_term(term) for term in model.terms], axis=0) / self.value)
 
 

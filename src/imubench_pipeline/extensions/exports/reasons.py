@@ -34,7 +34,7 @@ MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
 
 
 def value_kind(model: str, written: str, limited: bool) -> str:
-    """Return how the slow terms of a file were found, by the names of fitted and written model."""
+    """Return how the slow terms of a file were found; ``model``: fitted terms, as in ``N+GM+K``."""
     if limited:
         source = "" if "K" in written.split("+") else "from the "
         return f"{source}upper limit of K: the log does not show it"
@@ -65,7 +65,7 @@ def channel_in_use(
 
 
 def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
-    """Return a note on noise above ``cutoff``, Hz, in use; ``channels``: a text for each one."""
+    """Return a note on noise from a log in use above ``cutoff``, Hz; ``channels``: a text each."""
     at = number_text(cutoff)
     return (
         f"IN USE: at least the broadband noise above {at} Hz of a log in use. Below {at} Hz all is "
@@ -141,7 +141,10 @@ def families_compared(
     better: Sequence[tuple[str, float]],
     least: float,
 ) -> str:
-    """Return how far a family exceeds its limit (ratio, tau in s), and the closer families."""
+    """Return a text on the excess of a family above its limit, and on families with a smaller one.
+
+    ``excess`` is the ratio, and its tau, s; ``least`` is the least ratio of all families.
+    """
     text = (
         f"the Allan deviation of the smallest {family} is {number_text(excess[0], 3)} times its "
         f"limit at {number_text(excess[1])} s"

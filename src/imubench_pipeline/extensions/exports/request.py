@@ -236,7 +236,6 @@ def _bound_axis(
 
 
 def _list_larger_programs(family: Family) -> list[str]:
-    """List the programs that support more terms than a family has."""
     kinds = {
         other: [name for name, target in TARGETS.items() if target.family == other]
         for other in FAMILIES

@@ -46,7 +46,7 @@ TARGETS: Mapping[str, Program] = {
 
 
 def list_targets() -> tuple[str, list[tuple[str, ...]]]:
-    """Return a title, and a line per program after the header, for `imubench formats`."""
+    """Return title and lines of the table of programs; the first line is the header."""
     lines = [(one.name, one.title, one.file_name, one.family) for one in TARGETS.values()]
     title = "Programs that files are written for: `imubench export --target`, `exports: targets`"
     return title, [("target", "program", "file", "terms"), *lines]
