@@ -24,7 +24,7 @@ from imubench_pipeline.tables.findings import Finding
 
 
 def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
-    """Yield sensor, recording and quality of each recording of a plan that is not simulated."""
+    """Yield sensor, recording and quality of each recording of a plan, except simulated ones."""
     for (sensor, name), recording in plan.recordings.items():
         if recording.simulated:
             continue

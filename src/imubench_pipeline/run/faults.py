@@ -34,9 +34,9 @@ class Faults:
         self._lost: dict[Of, bool] = {}
 
     def attempt(self, of: Of, *, again: bool = True) -> int:
-        """Return the number of this run's attempt at a step; 0 if no attempt failed before.
+        """Return the number of this run's attempt at a step, ``of``; 0 if none failed before.
 
-        Without `again`, the step is not repeated: the number is the one of the last attempt.
+        Without `again`, the step is not repeated, and the number of the last attempt is returned.
         """
         record = self._before.get(of)
         tried, failed = (record.attempt, record.failed) if record else (0, False)

@@ -228,7 +228,7 @@ class Plan:
         return reason.replace(str(self.run.logs), "logs") if self.run.logs.is_absolute() else reason
 
     def kind(self, sensor: str, name: str) -> Kind:
-        """Return the experiment of a recording; if its notes are invalid, the intended one."""
+        """Return the kind of experiment of a recording, even if its notes are invalid."""
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self.simulated[sensor, name].kind
@@ -249,7 +249,7 @@ class Plan:
         return self._read_notes[recording.notes]
 
     def of_experiment(self, *keys: str) -> list[tuple[str, str]]:
-        """Return sensor and name of the recordings whose notes have one of these keys."""
+        """Return sensor and name of each recording of one of these experiments."""
         return [key for key in self.recordings if self._experiment(*key) in keys]
 
     def _experiment(self, sensor: str, name: str) -> str | None:

@@ -61,7 +61,6 @@ class LogHandler(LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
-        """Store the stream to which Snakemake would write."""
         asked = self.common_settings
         stream = sys.stdout if asked.stdout else sys.stderr
         self._whole: ColorizingTextHandler | None = None

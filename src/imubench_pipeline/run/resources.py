@@ -69,7 +69,7 @@ class Cost:
     many_jobs: bool = False
 
     def of(self, extent: Extent) -> tuple[float, float]:
-        """Return the memory in MB and the time in s for data of a size, the time with a margin."""
+        """Return the memory, MB, and the time, s, for data of a size; the time has a margin."""
         memory = self.memory + self.memory_of_samples * extent.million_samples
         of_channel = self.time_of_channels + self.time_of_values * extent.million_samples
         time = self.time + of_channel * extent.channels + self.time_of_each * extent.recordings

@@ -20,7 +20,7 @@ _SCRIPT_SIGNATURE = signature(script_of_snakemake)
 
 
 class Scripts:
-    """Replaces the function `script` of Snakemake, which rules with a script call.
+    """Replaces Snakemake's function `script`, which each rule with a script calls.
 
     A rule with the parameter ``attempt`` belongs to a recording or a sensor, which is left out if
     the script fails. A killed script, for example for lack of memory, is run once more. The job

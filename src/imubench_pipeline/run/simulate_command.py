@@ -240,7 +240,6 @@ def _rate(text: str | None, log: Any) -> float:
 
 
 def _duration(text: str | None, hours: float | None, rate: float) -> float:
-    """Return the length of the log in s."""
     option = f"--hours {hours:g}" if text is None else f"--duration {text}"
     with add_key_to_errors("--duration: "):
         duration = 3600.0 * (hours or 0.0) if text is None else parse_quantity(text, "time")

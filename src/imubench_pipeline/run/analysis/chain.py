@@ -90,7 +90,6 @@ class Analysis:
         return self._join_tables((*_ESTIMATE_TABLES, *_COMPARISON_TABLES, *_RECONSTRUCTION_TABLES))
 
     def _read(self, sensor: str, recording: str) -> list[str]:
-        """Read a log and compute its Allan curves; return its channels."""
         folder = self._get_folder(sensor, recording)
         source = self._plan.recordings[sensor, recording].path
         settings = self._plan.ingest_settings(sensor, recording)
@@ -169,7 +168,6 @@ class Analysis:
     def _submit(
         self, beside: ThreadPoolExecutor, step: str, keys: Iterable[K], function: Callable[..., T]
     ) -> dict[K, Future[T | None]]:
-        """Start a step for each key, except for omitted recordings."""
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
 
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:

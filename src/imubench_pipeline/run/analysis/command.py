@@ -209,7 +209,6 @@ def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.N
 
 @contextmanager
 def _draw_in_parallel(figures: Sequence[Callable[[], None]], cores: int) -> Iterator[None]:
-    """Draw figures in parallel processes; wait for them at the end."""
     from imubench_pipeline.readers.bounded import Bounded
 
     shares = [figures[first::cores] for first in range(min(cores, len(figures)))]
