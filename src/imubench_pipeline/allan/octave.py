@@ -122,7 +122,7 @@ class OctaveSums:
         self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
 
     def finish(self) -> None:
-        """Add the last samples; ValueError if a sample is infinite, or missing without ``holes``."""
+        """Add the last samples; ValueError if any is infinite, or missing without ``holes``."""
         sections = -(-len(self._rest) // SECTION_SAMPLES)
         if sections:
             self._sum(self._rest, sections, self._rest[:0], sections)

@@ -299,7 +299,6 @@ def _make_curve(
     sums: Sequence[NDArray[Any]],
     edges: Edges,
 ) -> AllanCurve:
-    """Return the curve from the sums over differences of means (see `full_sums`)."""
     shown = sums[2] > 0
     n = sizes[shown]
     total, thinned, terms, possible = (column[shown] for column in sums)

@@ -276,7 +276,6 @@ class _Fits:
         return find_end(-1.0, math.log(cutoffs[0])), find_end(1.0, math.log(cutoffs[-1]))
 
     def _find_maxima(self, kind: Kind, order: int, with_floor: bool) -> Iterator[_Trial]:
-        """Yield the maxima of the likelihood over the cut-off."""
         if with_floor and kind != "boxcar" and order == 1:
             return  # white noise plus a process
 
@@ -295,7 +294,6 @@ class _Fits:
                 yield trial
 
     def _list_cutoffs(self, kind: Kind, order: int) -> Array:
-        """Return the cut-offs from which a search starts, ascending, Hz."""
         if kind == "boxcar":
             return BOXCAR_CUTOFF_LENGTH * self.rate / np.arange(_MAX_BOXCAR_SAMPLES, 1.9, -1)
         lowest = self._lowest if order == 1 else _MIN_CUTOFF * self.rate

@@ -78,7 +78,6 @@ class FitSelection:
         return self.gain is None and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
 
     def _limit(self, spectrum: Spectrum, highest: float, source: BandSource) -> "FitSelection":
-        """Return the selection up to a frequency, Hz."""
         used = self.used & (spectrum.upper <= highest * (1.0 + 1e-9))
         return replace(self, used=used, band=Band(highest, source))
 

@@ -123,7 +123,6 @@ def find_durations_needed(
 
 
 def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
-    """Return the relative Cramér-Rao bounds of a model, given the bins of a spectrum."""
     times = maximum.times if len(maximum.times) else np.array([1.0])
     whittle = _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0)
     return compute_relative_bounds(whittle, maximum)

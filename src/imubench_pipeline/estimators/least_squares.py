@@ -455,7 +455,6 @@ def _estimate_lowest_point(
 
 
 def _explain_unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
-    """Return reasons if B and T_B, or T_B alone, are not identified."""
     if error > _MAX_RELATIVE_ERROR:
         of_bias = texts.large_error("B", error, _MAX_RELATIVE_ERROR)
         return {"B": of_bias, "T_B": f"{of_bias}; {texts.large_error('T_B', error_of_time)}"}

@@ -122,7 +122,6 @@ def _mark_alias(line: Line, lines: list[Line], block: int, rate: float) -> Line:
 
 
 def _compute_block_gain(frequency: float, block: int, rate: float) -> float:
-    """Return the amplitude gain of block means at a frequency."""
     half = math.pi * frequency / rate
     return abs(math.sin(block * half) / (block * math.sin(half))) if block > 1 else 1.0
 

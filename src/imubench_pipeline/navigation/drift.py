@@ -90,7 +90,7 @@ def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Or
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
-    """Yield a series per device with two ``ok`` recordings or more, simulated or measured."""
+    """Yield a series per device with two ``ok`` recordings or more; simulated ones separately."""
     groups: dict[tuple[str, str, bool], list[RecordingRow]] = {}
     for row in recordings:
         if row.status == "ok":

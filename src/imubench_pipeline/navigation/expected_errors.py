@@ -117,7 +117,6 @@ class Question:
         return self.confidence if self.error in ("velocity", "position") else None
 
     def _after(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
-        """Return the budget after a time of dead reckoning."""
         along = self.along_axis(time, gyro, accel)
         radius = self.confidence_in_plane
         return along if radius is None else along.to_radius(radius)

@@ -99,7 +99,6 @@ def _sum_squared_response(order: int, x: Real) -> Real:
 
 @lru_cache(maxsize=8)
 def _expand_squared_response(order: int) -> tuple[float, ...]:
-    """Return the coefficients of the power series of `integrate_squared_response`."""
     powers = np.arange(_MAX_SERIES_TERMS)
     single = [(-1.0) ** n / math.factorial(n + order + 1) for n in powers]
     square = np.convolve(single, single)[:_MAX_SERIES_TERMS]

@@ -376,7 +376,6 @@ class Groups:
 
 
 def _measure_span(stamps: tracking.Stamps) -> float:
-    """Return the time between the earliest and the latest stamp, s."""
     low, high = np.inf, -np.inf
     for block in stamps():
         if np.isfinite(block).any():

@@ -53,7 +53,6 @@ class FileSeries:
 
     @cached_property
     def _times(self) -> Array:
-        """The times of the rows, s."""
         times = self._read(_TIME_COLUMN, "time")
         if not len(times):
             raise ConfigError(f"{self.path}: has no rows; expected at least one")

@@ -113,7 +113,6 @@ def find_deterministic_signals(
 
 
 def _describe(ordinates: Ordinates, searched: search.SearchResult) -> Iterator[DeterministicSignal]:
-    """Yield the signals with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):

@@ -49,7 +49,10 @@ class Score:
 
 
 class Gain:
-    """Computes twice the log likelihood that one more regressor adds in a part, by ``density``."""
+    """Computes twice the log likelihood that one more regressor adds.
+
+    It is for one part of the log; the density of the noise is given.
+    """
 
     def __init__(
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int

@@ -427,7 +427,6 @@ def _add_length(parameter: Parameter, duration: float) -> Parameter:
 
 
 def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions, factors: Array) -> Estimate:
-    """Return the estimate: values of the best model, limits of the draws."""
     curve, model = points.curve, fitted.model
     roots = np.sqrt(drawn.squares)
     times = np.where(np.isfinite(drawn.times), drawn.times, np.inf)
@@ -551,7 +550,6 @@ def _group(drawn: Solutions) -> list[Models]:
 
 
 def _join(drawn: Solutions) -> JointDraws:
-    """Return the draws as they are kept."""
     N, F, G, K, R = np.sqrt(drawn.squares).T
     alone = F == 0.0
     first = np.column_stack(

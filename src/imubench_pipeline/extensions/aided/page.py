@@ -204,7 +204,6 @@ def _format_outage(row: NavigationRow) -> str:
 
 
 def _format_figure(row: NavigationRow, name: str, factor: float = 1.0) -> str:
-    """Return a column with its limits, if any."""
     sizes = [getattr(row, f"{name}{end}") for end in ("", "_lower", "_upper")]
     if sizes[0] is None:
         return "–"

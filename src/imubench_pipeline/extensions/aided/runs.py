@@ -73,7 +73,6 @@ class Drive:
         self._sigmas = np.array([*trajectory.gnss.spread[:6], *attitude])
 
     def _epochs(self, length: float) -> int:
-        """Return the number of epochs of an outage of this length, s."""
         return math.ceil(length / self.period - 1e-6)
 
     def of_outages(self, length: float) -> NDArray[np.int64]:

@@ -282,7 +282,6 @@ def _draw_panel(
 
 
 def _set_limits(axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float) -> None:
-    """Set axis limits for all values and, within bounds, their intervals."""
     values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
     # The arrow of a limit needs room at its left.
     values += [mark.value * scale / 2.5 for mark in drawn if mark.value and mark.kind == "limit"]

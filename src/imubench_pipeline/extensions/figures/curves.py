@@ -379,7 +379,6 @@ def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Fig
 
 
 def _draw_lines(axes: Axes, view: ChannelView) -> None:
-    """Draw the spectral lines, the largest with their frequency."""
     frequency = view.spectrum["frequency"]
     apart = (frequency[-1] / frequency[0]) ** _LABEL_OFFSET
     named: list[float] = []

@@ -344,7 +344,6 @@ class VectorNavFile(LogFile):
         )
 
     def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the stamps of some records, and a mask of the missing ones."""
         assert self.log.time is not None
         if self.log.time.column == COUNTER:
             texts = [row.counter for row in rows]

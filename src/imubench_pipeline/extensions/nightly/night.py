@@ -183,7 +183,6 @@ class Night:
         lock.left_over = {}
 
     def _run_snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
-        """Run Snakemake; return the reason of a failure, if any."""
         names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
         held_back = self.folder / "held_back.yaml"
         write_json({"held_back": sorted(names)}, held_back)
@@ -281,8 +280,6 @@ def _load_results(results: Path) -> Results:
 
 @contextmanager
 def _interrupt_on_signals() -> Iterator[None]:
-    """Handle termination signals like Ctrl-C, for an orderly end."""
-
     def stop(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 

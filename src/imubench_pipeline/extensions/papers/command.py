@@ -80,7 +80,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _make_parts(
     title: str, rows: "Sequence[PublishedRow]", width: int
 ) -> "Iterator[RenderableType]":
-    """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 
     from imubench_pipeline.extensions.papers.page import format_cells

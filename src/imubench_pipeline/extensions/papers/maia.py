@@ -309,7 +309,6 @@ def _format_share(part: float) -> str:
 
 @cache
 def _count_in_range() -> dict[str, int]:
-    """Return how many figures of Table 3 are within the range of each grid."""
     inside: dict[str, int] = dict.fromkeys(GRIDS, 0)
     for grid, channel in product(GRIDS, CHANNELS.values()):
         spread = simulate_lottery(channel, grid)

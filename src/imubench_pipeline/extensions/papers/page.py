@@ -33,7 +33,6 @@ def _make_context(site: Site) -> dict[str, Any]:
 
 
 def _select_recordings(site: Site) -> list[RecordingView]:
-    """Return the recordings whose curves are drawn."""
     names = dict.fromkeys(
         (one.sensor, one.recording) for paper in read_papers() for one in paper.drawn
     )
@@ -54,7 +53,6 @@ PAPERS_PAGE = Entry(
 
 
 def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
-    """Return the curves that reproduce figures of the papers, as far as they exist."""
     channels = {
         (*view.full_name, channel.channel): (view, channel)
         for view in _select_recordings(site)
@@ -69,7 +67,6 @@ def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]
 
 
 def _describe_accuracy(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
-    """Return the errors of each method relative to the bound: a line per method."""
     symbols = list(dict.fromkeys(row.parameter for row in rows))
     by = {(row.method, row.parameter): row for row in rows}
     return {

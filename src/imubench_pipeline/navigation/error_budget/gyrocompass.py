@@ -90,7 +90,6 @@ class Gyrocompass:
 
     @property
     def _north_rate(self) -> float:
-        """North component of the Earth's rate, rad/s."""
         return EARTH_RATE * math.cos(self.latitude)
 
     @property

@@ -224,7 +224,6 @@ class Judgement:
 
     @property
     def _verdict_on_errors(self) -> Verdict:
-        """Verdict on the errors: the worst one if all limits are known."""
         if not self.decides.known:
             return self.decides.verdict
         return min((each.verdict for each in self.standings), key=_WORST_FIRST.index)
@@ -312,7 +311,6 @@ def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[
 def _pool_spreads(
     of_sensors: Mapping[str, Sequence[ErrorBudgetRow]], basis: Basis, *, simulated: bool
 ) -> dict[tuple[Any, ...], Spread]:
-    """Return the pooled spread of all sensors with several specimens, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
     for sensor, rows in of_sensors.items():
         devices, made = _map_specimens(sensor, rows, basis)

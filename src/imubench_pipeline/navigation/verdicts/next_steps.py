@@ -84,7 +84,6 @@ def list_next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextS
 
 
 def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield the steps that could change one verdict or make its evidence stronger."""
     unless, name = judgement.unless, judgement.name
     if unless is not None:
         action: Action = "check_unit" if unless.factors else "record_again"

@@ -239,5 +239,4 @@ def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:
 
 
 def _list_keys(keys: list[str]) -> str:
-    """Return keys as text, with the axes of one quantity combined."""
     return ", ".join(dict.fromkeys(re.sub(r"_[xyz]\.", "_*.", key) for key in keys))

@@ -322,7 +322,6 @@ def find_imus(contents: Contents) -> list[tuple[str, ...]]:
 
 
 def _explain_rejection(group: Group) -> str:
-    """Return the reason why a group is never used; empty if it can be used."""
     if group.rank == DERIVED:
         return "filter output or metadata, not a measurement of the sensor"
     if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:

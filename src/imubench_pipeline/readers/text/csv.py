@@ -99,7 +99,6 @@ class CsvFile(LogFile):
         time: text_stamps.TextTime | None,
         records: Records,
     ) -> Iterator[pa.RecordBatch]:
-        """Yield the required columns, named by their positions, block by block."""
         types = dict.fromkeys(figures, pa.float64()) | (time.types if time else {})
         fault = _WrongWidth()
         rows = 0
@@ -205,7 +204,6 @@ class CsvFile(LogFile):
 
 
 def _read_ahead(parts: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
-    """Yield parts while another thread parses the next ones."""
     with ThreadPoolExecutor(1) as pool:
         waiting = deque(pool.submit(next, parts, None) for _ in range(_BLOCKS_AHEAD))
         while (part := waiting.popleft().result()) is not None:

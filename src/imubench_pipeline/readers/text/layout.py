@@ -202,7 +202,6 @@ class _Search:
         )
 
     def _signs(self, split: Split | None) -> tuple[str, ...]:
-        """Return the prefixes of comments, without the delimiter."""
         if self._log.comment is not None:
             return (self._log.comment,)
         delimiter = split.delimiter if split else self._log.delimiter
@@ -296,7 +295,6 @@ class _Search:
         return self._any_name.search(line.text.replace('"', "")) is not None
 
     def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:
-        """Return the names in a line, without the sign of a comment."""
         names = split.names(line.text, width)
         sign = next((sign for sign in self._signs(split) if line.text.startswith(sign)), None)
         if sign is None or (names and names[0] in self._names):
@@ -382,7 +380,6 @@ class _Search:
         return before[max(others, default=-1) + 1 :]
 
     def _places(self, names: list[str]) -> set[int]:
-        """Return the positions of the required number columns that exist."""
         return {
             column - 1 if isinstance(column, int) else names.index(column)
             for column in self._figures

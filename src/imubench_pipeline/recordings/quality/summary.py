@@ -65,7 +65,6 @@ class BlockAccumulator:
 
 
 def _merge_blocks(rows: Array, together: int) -> Array:
-    """Merge groups of ``together`` blocks; the last group may be smaller."""
     if together == 1 or len(rows) == 0:
         return rows.copy()
     begins = np.arange(0, len(rows), together)

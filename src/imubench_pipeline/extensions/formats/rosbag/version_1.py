@@ -164,7 +164,6 @@ class _TruncatedError(Exception):
 
 
 def _read_record(file: BinaryIO) -> tuple[dict[bytes, bytes], bytes] | None:
-    """Return header and data of the next record of a file; None at the end."""
     size = file.read(4)
     if not size:
         return None
