@@ -95,7 +95,7 @@ def compute_fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """Return the magnitude of the fixed bias of a channel from a static recording, rad/s or m/s².
 
     For a gyro it is the magnitude of the mean, which includes the Earth's rotation. For a vertical
-    accelerometer axis it is the norm of the three axes less standard gravity. On any other axis, a
+    accelerometer axis it is the norm of the three axes minus standard gravity. On any other axis, a
     bias cannot be distinguished from a tilt. The limits allow for the unknown part of the Earth's
     rate, or of gravity.
     """

@@ -112,7 +112,7 @@ class Expected:
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
-    """Return the usual levels of a quantity: by the sensor's file, else of any such sensor."""
+    """Return the usual levels of a quantity, from the sensor's file or else for any sensor."""
     usual = _USUAL_GYRO_DENSITY if quantity == "gyro" else None
     if sensor is None:
         return Expected(usual)

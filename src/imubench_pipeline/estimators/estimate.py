@@ -189,7 +189,7 @@ class Estimate:
 
     @property
     def model(self) -> NoiseModel:
-        """The noise model of the parameters that have a value, or are fitted."""
+        """The noise model with all parameters that have a value, or a fitted one."""
         values = {name: parameter.in_model for name, parameter in self.parameters.items()}
         amplitudes = {name: values.get(name) or 0.0 for name in ("Q", "N", "B", "K", "R")}
         pairs = [(group["B"].in_model, group["T_B"].in_model) for group in self.further]

@@ -26,7 +26,7 @@ _DURATION_RATIOS = np.geomspace(1e-4, 1e4, 17)  # Durations tried over the durat
 
 
 def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
-    """Return relative Cramér-Rao bounds of the parameters, T_B and R, (m,); infinite for 0."""
+    """Return relative Cramér-Rao bounds of the parameters, T_B and R, (m,); infinite if 0."""
     sensitivity = whittle.sensitivity(maximum)
     if maximum.terms.ramp:
         sensitivity[-1] *= maximum.ramp

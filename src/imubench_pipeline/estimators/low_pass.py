@@ -40,9 +40,9 @@ class Filter:
     def white(self, frequency: ArrayLike, rate: float) -> Array:
         """Return G, the density of white noise of N = 1 behind the filter, sampled at a rate, Hz.
 
-        For the analogue filter the sum over all aliases is exact: 1 / (1 + x^(2 n)) has the poles
-        p_j with p_j^(2 n) = -1, and sum_k 1 / (x + k / r - p_j) = pi r cot(pi r (x - p_j)) with
-        x = f / f_c and r = f_c / f_s.
+        For the analogue filter of order n, the sum over all aliases is exact: 1 / (1 + x^(2 n)) has
+        the poles p_j with p_j^(2 n) = -1, and sum_k 1 / (x + k / r - p_j) = pi r cot(pi r (x -
+        p_j)) with x = f / f_c and r = f_c / ``rate``.
         """
         f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "bilinear":
@@ -98,7 +98,7 @@ class Filter:
 
         The even continuation of a smooth signal has discontinuous slopes at its ends. They add the
         density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, with V the variance of first differences,
-        w = 2 pi f T, and ``length`` = n T the duration of the transform at each frequency, s.
+        w = 2 pi f T, T = 1 / ``rate``, and ``length`` = n T the duration of the transform, s.
         """
         grid = (np.arange(_GRID_SIZE) + 0.5) / _GRID_SIZE * 0.5 * rate
         variance = float(np.mean(self.white(grid, rate) * _difference_gain(grid, rate))) * rate

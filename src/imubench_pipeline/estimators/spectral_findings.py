@@ -68,12 +68,12 @@ def find_missing_slow_noise(
 ) -> Finding | None:
     """Return a finding if the lowest frequencies have less power than white noise.
 
-    Slow noise only adds to the density of white noise, N^2, below a sensor's low-pass. A log with
-    less had its bias zeroed repeatedly at rest, passed a high-pass, or had a curve or means of its
-    parts subtracted: its K and B, and the dead reckoning errors computed from them, are too small.
-    Ordinates of white noise over N^2 sum to chi-squared, with nu degrees of freedom: a sum far
-    below is not chance. ``spectrum`` is of the log without corrections; ``fitted``, shape (b,), the
-    density of the chosen model in each bin, or NaN; ``white`` the lower limit of N, SI, if known.
+    Slow noise only adds to the density of white noise, N^2, below a sensor's low-pass. If a log has
+    a lower density, its bias was zeroed at rest, it passed a high-pass, or a curve or means of its
+    parts were subtracted: K, B, and the dead reckoning errors computed from them are too small.
+    Ordinates of white noise, divided by N^2, sum to chi-squared with nu degrees of freedom: a sum
+    far below is not chance. ``spectrum`` is of the log without corrections. ``fitted``, shape (b,),
+    is the density of the chosen model in each bin, or NaN; ``white`` the lower limit of N, SI.
     """
     if not white or not np.isfinite(white):
         return None

@@ -296,8 +296,8 @@ class Whittle:
     def sensitivity(self, maximum: Maximum) -> Array:
         """Return S with S S^T the Fisher information of (log parameter ..., log T_B ..., R).
 
-        Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
-        order is `Maximum.powers`, then `times`.
+        Shape (m, b), or (m, 2 b) with a ramp, which has no information in common with the other
+        parameters; the order is `Maximum.powers`, then `times`.
         """
         matrix = self.matrix(maximum.terms, maximum.times)
         total = matrix @ maximum.powers

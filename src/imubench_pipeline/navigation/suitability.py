@@ -96,7 +96,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(requirement: Requirement, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
-    """Return the required properties that a sensor lacks, and others that are not known."""
+    """Return the required properties that a sensor lacks, and the unknown ones."""
     points: dict[tuple[Property, str], tuple[bool | None, Shortfall]] = {}
     for fulfilled, point in _compare(requirement, has):
         points.setdefault((point.property, point.subject), (fulfilled, point))

@@ -36,7 +36,7 @@ class Lock(AbstractContextManager["Lock"]):
     """A lock on a folder of results, which the system releases if the process is killed.
 
     Each process that has ``descriptor`` open holds the lock; Snakemake inherits it. The file has a
-    note about the holder; in the file of a free lock, it is from a run that was killed.
+    note about the holder; if the lock is free, the note is from a run that was killed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,7 +48,7 @@ class Lock(AbstractContextManager["Lock"]):
         caller sets it to empty; until then, the note stays for the next run."""
 
     def acquire(self, wait: float = 0.0) -> None:
-        """Acquire the lock; raise `TakenError` if another run holds it for more than `wait` s."""
+        """Acquire the lock; raise `TakenError` if another run still holds it after `wait` s."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         until = time.monotonic() + wait

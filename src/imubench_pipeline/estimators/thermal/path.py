@@ -34,7 +34,7 @@ _MAX_ROUNDING = 0.2  # maximum deviation of decimal readings from multiples of a
 
 @dataclass(frozen=True)
 class Readings:
-    """The readings of a register in blocks that have at least one."""
+    """The readings of a register, summarised in blocks; blocks without a reading are left out."""
 
     centre: Array  # (k,): middle of each block, samples
     count: NDArray[np.int64]  # (k,): readings present

@@ -71,7 +71,7 @@ def make_calibration_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
-    `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
+    `folder`: results of the recording; `static`: results of the static recordings of its sensor;
     `settings`: from `run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
     tables: dict[str, list[TableRow]] = {name: [] for name in CALIBRATED}

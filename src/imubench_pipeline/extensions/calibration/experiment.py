@@ -25,7 +25,7 @@ _MIN_PRESENT_SHARE = 0.5  # of the samples of a block, or its mean is left out
 
 @dataclass(frozen=True)
 class Dwell:
-    """Samples at rest in one position; ValueError without a sample, or if the sense is wrong."""
+    """Samples at rest in one position; ValueError without a sample, or if sense is not 1 or -1."""
 
     # start, stop: first sample of the log, and the one past the last
     start: int
@@ -74,7 +74,7 @@ class Experiment:
         latitude: float,
         first: int = 1,
     ) -> "Experiment":
-        """Return dwells of equal length and alternate sense; arguments in s, Hz and rad."""
+        """Return dwells of equal length; the sense alternates (1, -1); arguments in s, Hz, rad."""
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
         return cls(
@@ -125,7 +125,7 @@ class Blocks(SampleBlocks):
 
     @property
     def seen(self) -> Array:
-        """Sensitivity of each block to the Earth's rate: sense times cos(latitude), shape (b,)."""
+        """Sensitivity of each block to the Earth's rate, (b,): cos(latitude) times 1 or -1."""
         return self.sense * math.cos(self.latitude)
 
     @property

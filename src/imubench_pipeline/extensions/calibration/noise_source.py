@@ -109,7 +109,7 @@ def find_noise_source(
 ) -> NoiseSource | None:
     """Return the noise of a gyro from a static recording, else from its datasheet, else None.
 
-    `folder`: results of the turned recording; `static`: the same of the static recordings of its
+    `folder`: results of the turned recording; `static`: results of the static recordings of its
     sensor; `draws`: number of models drawn from the uncertainty of a static log.
     """
     own = Quality.read(folder / "quality.json").recording

@@ -223,7 +223,7 @@ def make_rest_section(site: Site, view: RecordingView) -> tuple[str, Mapping[str
 
 @dataclass(frozen=True)
 class CalibratedRun:
-    """A calibrated recording: its lines by parameter, its result and the correction in words."""
+    """A calibrated recording: table lines by parameter, and result and correction in words."""
 
     view: RecordingView
     lines: Mapping[str, CalibrationLine]

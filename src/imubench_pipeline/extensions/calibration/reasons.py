@@ -23,8 +23,8 @@ def describe_static_noise(
 ) -> str:
     """Return a note on the static recording that a noise model comes from.
 
-    ``device``: device of the recording, if another one; ``channels``: the channel that is used,
-    and the channel without an estimate, if they differ.
+    ``device``: device of the recording, if it is another specimen; ``channels``: the channel that
+    is used, and the wanted channel without an estimate, if they differ.
     """
     words = [f"static recording {recording}"]
     if device is not None:

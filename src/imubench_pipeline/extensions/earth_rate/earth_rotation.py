@@ -66,7 +66,7 @@ def make_earth_rate_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a turned gyro; none for a rejected recording.
 
-    `folder`: results of the recording; `static`: the same of the static recordings of its sensor;
+    `folder`: results of the recording; `static`: results of the static recordings of its sensor;
     `settings`: from `imubench_pipeline.run.plan.Plan.experiment_settings`.
     """
     rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}

@@ -57,7 +57,7 @@ _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goa
 
 @dataclass(frozen=True)
 class DwellCurve:
-    """The least standard deviation of the rate as a function of the dwell, for a run time."""
+    """The least standard deviation of the rate as a function of the dwell, for one run length."""
 
     dwells: NDArray[np.int64]  # shape (k,); number of dwells, increasing
     dwell: Array  # shape (k,); data in each, s

@@ -87,8 +87,8 @@ def estimate_courses(
     """Estimate the Earth's rate by every method; ``papers``: model for the filter of Silva et al.
 
     The log, shape (n,), is in rad/s, NaN where a sample is missing; the turn-on bias is a standard
-    deviation, rad/s (None: unknown). Raises ValueError if there are no dwells, or if all have the
-    same sense (one position only).
+    deviation, rad/s (None: unknown). Raises ValueError if all dwells have the same sense (one
+    position only), or as `block_means`.
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
         raise ValueError("all dwells have one position: rate and bias cannot be separated")
@@ -203,7 +203,7 @@ class PrintedRun:
     sigma: float  # standard deviation of the mean over pairs by noise, rad/s
 
     def without(self, last: "PrintedRun") -> "PrintedRun":
-        """Return a run without its last part, whose pairs are disjoint from the others."""
+        """Return the run without its last part; the two have no pair of dwells in common."""
         rest = self.duration - last.duration
         value = (self.duration * self.value - last.duration * last.value) / rest
         # Disjoint pairs: the variances of both parts add up, weighted by their lengths squared.

@@ -337,7 +337,7 @@ class Turning:
         return sum(turn.found_by == "schedule" for turn in self.turns)
 
     def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
-        """Return the sense of each sample, shape (samples,), 0 where it is not used; rate in Hz."""
+        """Return the sense (1, -1) of each sample, (samples,); 0: not used; rate in Hz."""
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:
             sense[slice(*_find_samples(dwell.start, dwell.stop, rate))] = dwell.sense

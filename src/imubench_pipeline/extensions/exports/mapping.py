@@ -113,7 +113,7 @@ def _make_process(variance: float, horizon: float, T_B: float) -> GaussMarkov:
 def map_to_family(
     model: NoiseModel, family: str, horizon: float, rate: float, time: float | None = None
 ) -> Mapped:
-    """Replace a model by one of a family; N+GM+K: unchanged. `time` is as in `as_process`."""
+    """Replace a model by one of a family; N+GM+K: unchanged. Arguments are as in `as_process`."""
     if family == "N+K":
         return as_walk(model, horizon, rate)
     return as_process(model, horizon, rate, time=time) if family == "N+GM" else Mapped(model, [])

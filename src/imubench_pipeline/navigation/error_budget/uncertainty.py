@@ -41,10 +41,11 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     Posterior draws are used with all parameters of a model together, thinned evenly or repeated, in
     random order. Lines are independent of the noise parameters, and drawn separately.
 
-    If an estimate has no draws, its parameters are drawn from their limits **independently**, which
-    they are not: intervals of functions of several of them are 1.0 to 3.5 times too wide. Each is
-    log-normal about its value, with a separate spread on either side (towards a lower limit of 0,
-    linear). An absent parameter with an upper limit is half-normal from 0. A ramp is normal.
+    If an estimate has no draws, its parameters are drawn from their limits **independently**. In
+    fact they are correlated: intervals of functions of several parameters are 1.0 to 3.5 times too
+    wide. Each is log-normal about its value, with a separate spread on either side (linear towards
+    a lower limit of 0). An absent parameter with an upper limit is half-normal from 0. A ramp is
+    normal.
     """
     if estimate.draws is None:
         models = []

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments for the logs of a command, and for how these are read and analysed."""
+    """Add the arguments that name the logs, and state how to read and analyse the logs."""
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
     )
