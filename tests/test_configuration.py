@@ -73,7 +73,7 @@ def test_a_sensor_file_is_read() -> None:
         ("log.rate", "100", r"log.rate: .*'100' is not a number with its unit"),
         ("log.rate", "0 Hz", r"above zero"),
         ("log.rate", None, r"expected 'rate'.*or 'time'"),
-        ("log.time", {"column": "t"}, r"either 'unit'"),
+        ("log.time", {"column": "t"}, r"exactly one of 'unit'"),
         ("log.reader", "cvs", r"log.reader: found 'cvs'; input should be"),
         ("datasheet.gyro.noise_density.unit", "deg/s", r"noise_density.unit: 'deg/s' is no"),
         ("datasheet.gyro.noise_density.sidedness", "both", r"found 'both'"),

@@ -158,7 +158,7 @@ def match_variance(weights: Array) -> float:
 
 
 def match_lower_tail(weights: Array) -> float:
-    """Return degrees of freedom that match the lower 2.5 % quantile of the `match_variance` sum."""
+    """Return degrees of freedom matched to the lower 2.5 % tail (see `match_variance`)."""
     if len(weights) == 1:
         return 1.0
     quantile = find_lower_quantile(weights, _LOWER_TAIL)

@@ -38,7 +38,7 @@ class Scores:
 
 
 def weights(error: Array) -> Array:
-    """Return the weight of each tau, with the sum 1, from its relative standard error, (m,)."""
+    """Return the weight of each tau, sum 1, from its relative standard error; shapes (m,)."""
     weight = 1.0 / (error**2 + SUREST**2)
     return np.asarray(weight / weight.sum())
 
@@ -49,13 +49,13 @@ def rms(one: Array, other: Array, weight: Array | None = None) -> Array:
 
 
 def beats(one: Array, other: Array) -> float:
-    """Return the probability that a random value of ``one`` is below a random one of ``other``."""
+    """Return the probability that a value of ``one``, shape (k,), is below a value of ``other``."""
     place = np.searchsorted(np.sort(other), one, side="right")
     return float(1.0 - np.mean(place) / other.size)
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Compare curves of a model, (m,), and of its draws, (k, m), with the measured, (m,), SI."""
+    """Score the curve of a model, shape (m,), and of its draws, (k, m), against ``measured``, SI."""
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

@@ -189,7 +189,7 @@ def compute_root_mean_square(of_runs: Array) -> Interval:
 
 
 def compute_ratio(of_runs: Array, others: Array) -> Interval:
-    """Return the ratio of two rms errors, with limits, from the mean squares of each run, (R,).
+    """Return the ratio of two rms errors, with limits, from mean squares by run, shapes (R,).
 
     The numerator is from ``of_runs``; ``others`` has the same unit.
     """

@@ -108,7 +108,7 @@ def _run_filter(
 
 
 def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
-    """Return the time, s, from which a mean, (n,), stays near the known rate; else inf."""
+    """Return the time, s, from which a mean, shape (n,), stays near the known rate; else inf."""
     out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
     if len(out) == 0:
         return 0.0
