@@ -151,7 +151,7 @@ def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
 
 
 def count_sensors_within(quantity: str, figure: str, largest: float) -> tuple[int, int]:
-    """Return how many sensors print a figure up to ``largest``, SI, and how many print it."""
+    """Return how many sensors print a figure up to ``largest``, SI, and how many print any."""
     values = find_limit(None, quantity, figure).sensors.values()
     return sum(value <= largest for value in values), len(values)
 

@@ -18,7 +18,7 @@ _MIN_STATED_RATIO = 1.1  # Smaller differences of two estimates change no decisi
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
-    """Return an estimate whose values are doubtful where the reference excludes them."""
+    """Return an estimate; each of its values that the reference excludes becomes doubtful."""
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # With several terms, each has its own B: compare with the B of the curve.

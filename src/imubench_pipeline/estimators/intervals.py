@@ -184,7 +184,7 @@ def describe(
     draws: dict[Terms, Posterior],
     highest: float,
 ) -> Estimate:
-    """Return the estimate of a fit: a value with its interval, or a status, by parameter.
+    """Return the estimate of a fit: for each parameter a value with its interval, or a status.
 
     The intervals of all parameters cover the models ``alike``, which include ``chosen``, weighted
     by AIC. K is the median over these models: they divide the power of the lowest frequencies

@@ -49,7 +49,7 @@ MAX_LINES = 16  # Lines that are used individually; the weaker ones together are
 
 @dataclass(frozen=True)
 class Line:
-    """A line with 95 % limits; a band of noise is wide, an alias the image of a faster line."""
+    """A spectral line with 95 % limits: a sinusoid, a band of noise, or an alias of a line."""
 
     frequency: float  # Hz
     frequency_lower: float
@@ -66,7 +66,7 @@ class Line:
 
     @property
     def narrow(self) -> bool:
-        """Whether it is a sinusoid."""
+        """Whether the line is a sinusoid."""
         return self.kind == "sinusoid"
 
     @property
@@ -78,7 +78,7 @@ class Line:
 def find_lines(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Return the spectral lines, sorted by frequency; up to ``crossover``, Hz, from block means."""
+    """Return the spectral lines, by frequency; block means are used up to ``crossover``, Hz."""
     searched = []
     for spectrum in spectra:
         between = int(crossover / spectrum.frequency[1]) if len(spectra) > 1 else 0

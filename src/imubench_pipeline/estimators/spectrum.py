@@ -186,7 +186,7 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
 
 
 def make_bins(frequency: Array, length: Array) -> tuple[NDArray[np.int64], dict[str, Array]]:
-    """Return the first ordinate of each bin, and columns of the spectrum that follow from them."""
+    """Return the first ordinate of each bin, and the columns of `Spectrum` that the bins give."""
     edges = list(range(min(SINGLE, len(frequency))))
     while edges[-1] + 1 < len(frequency):
         beyond = np.searchsorted(frequency, frequency[edges[-1]] * WIDTH * (1 - 1e-12))

@@ -160,7 +160,7 @@ class Plan:
         return to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
-        """Return the number of the attempt at a step (`Faults.attempt`); if postponed, the last."""
+        """Return the number of the attempt at a step; of the last one if the step is postponed."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
@@ -175,7 +175,7 @@ class Plan:
     def list_ingests_without_samples(
         self, jobs: Iterable[Mapping[str, str]]
     ) -> dict[str, Mapping[str, str]]:
-        """Return the jobs with removed samples, by the name of the seal of their ingest."""
+        """Return the jobs whose ingested samples were removed, by the name of the ingest's seal."""
         again = {}
         for job in jobs:
             key = (job.get("sensor", ""), job.get("recording", ""))

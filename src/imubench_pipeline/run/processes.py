@@ -68,7 +68,7 @@ class Processes:
         atexit.register(self.close)
 
     def run(self, job: Job, seconds: float | None = None) -> None:
-        """Run a script; `StepError` if it fails or takes over `seconds`, imports not counted."""
+        """Run a script; `StepError` if it fails, or runs over `seconds` (without its imports)."""
         ours, theirs = Pipe()
         with ours:
             with theirs:

@@ -159,7 +159,7 @@ def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
 
 
 def estimate_text_size(path: Path) -> int:
-    """Return the estimated size of a log file if it were text, bytes; 0 if there is no file."""
+    """Estimate the size, bytes, that a log file would have as text; 0 if there is no file."""
     if not path.is_file():
         return 0
     suffix = path.suffix.lower()

@@ -306,7 +306,7 @@ def choose_turns(
 def find_shorter_dwell(
     events: Sequence[Event], chosen: Sequence[int], dwell: float
 ) -> float | None:
-    """Return the dwell of the clear transients, s, if far shorter than the nominal; else None.
+    """Return the dwell between clear transients, s, if far shorter than nominal; else None.
 
     If turns are twice as frequent as declared, `choose_turns` takes every second one for a knock,
     but these knocks are periodic. The events are in order of time; ``chosen`` are the indices of

@@ -86,7 +86,7 @@ class DeadReckoning:
         return MIN_WINDOWS * (self.rest + self.time)
 
     def sigma(self, model: NoiseModel) -> float:
-        """Return the standard deviation that a noise model predicts for it, rad, m/s or m."""
+        """Return the standard deviation of the error that a noise model predicts, rad, m/s or m."""
         start = Calibrated(self.rest)
         parts = of_sensor("gyro", model, self.order, self.time, start, self.factor)
         return math.hypot(*(part.sigma for part in parts))

@@ -44,7 +44,7 @@ class Gyrocompass:
     temperature_change: float = 0.0  # during the whole time, linear, K
 
     def heading(self, time: float) -> Budget:
-        """Return the heading error after a static window, s, by source, rad.
+        """Return the contributions to the heading error, rad, after a static window, s.
 
         At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
         n positions sigma^2(t/n) / n, with sigma^2 the Allan variance (Britting, "Inertial

@@ -37,7 +37,7 @@ Packed = dict[str, Any]
 
 
 def pack_requirement(name: str, requirement: Requirement) -> Packed | None:
-    """Return a requirement as plain values; None if it has limits in outages or of north."""
+    """Return a requirement as plain values; None if it has limits in outages or for north."""
     questions = list(list_requirement_questions(name, requirement))
     if requirement.in_outages or any(question.error == "north" for question in questions):
         return None

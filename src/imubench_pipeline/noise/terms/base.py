@@ -235,7 +235,7 @@ class Term(ABC):
         return None
 
     def realised(self, interval: float, longest: float) -> "Sequence[Term]":
-        """Return terms with finite states, close to it at tau from ``interval`` to ``longest``."""
+        """Return finite-state terms that approximate it at tau from ``interval`` to ``longest``."""
         return [self]
 
     def scaled(self, factor: float) -> Self:
