@@ -524,8 +524,7 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
     """Return which axes are missing in the log and replaced by others, in a sentence."""
     lent_axes = []
     for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
-        pairs = zip("xyz", channels, strict=True)
-        lent = [axis for axis, channel in pairs if channel[-1] != axis]
+        lent = [axis for axis, channel in zip("xyz", channels, strict=True) if channel[-1] != axis]
         if lent:
             lent_axes.append(f"{words} {' and '.join(lent)}")
     if not lent_axes:
