@@ -253,13 +253,13 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
     largest_first = sorted(parts.items(), key=lambda part: -part[1])
     shown = [(name, round(100.0 * part)) for name, part in largest_first if part >= 0.005]
     if shown and (rest := 100 - sum(percent for _, percent in shown)) > 0:
-        shown.append(("other", rest))
+        shown.append(("rest", rest))
     return ", ".join(f"{name} {percent} %" for name, percent in shown)
 
 
 _ORIGINS_OF_FIGURES: Mapping[Origin, str] = {
-    "measured": "other measured figures",
-    "datasheet": "other datasheet figures",
+    "measured": "measured figures except noise",
+    "datasheet": "datasheet figures except noise",
     "class limit": "unknown figures (assumed worst)",
     "requirement": "stated figures",
 }

@@ -56,8 +56,8 @@ WHOLE = "whole"  # name of the part that is a whole recording
 _MIN_SCHEDULED_SHARE = 0.9  # share of turns found by the schedule alone: turns are not visible
 _Z_95 = 1.96  # standard deviations of a 95 % limit
 _GIVEN = (
-    "bias tracking with known rate: the Earth's rate is an input of this filter, and its result "
-    "returns to this input; it is no estimate"
+    "bias tracking with known rate: this filter is given the Earth's rate, and its output "
+    "approaches the given rate; it is no estimate"
 )
 
 
