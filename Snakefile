@@ -1,7 +1,7 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
 
-include: "workflow/rules/common.smk"  # the plan of the run, and what the rules share
+include: "workflow/rules/common.smk"  # the plan of the run, and functions of the rules
 include: "workflow/rules/recordings.smk"  # one log: samples, curve, estimates, scores, errors
 include: "workflow/rules/sensors.smk"  # the recordings of a sensor
 
@@ -12,7 +12,7 @@ for file in files_of("rules"):  # of extensions
 
 
 include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortlist, fusion
-include: "workflow/rules/report.smk"  # what is read: pages
+include: "workflow/rules/report.smk"  # pages
 
 
 # Missing and changed outputs are requested by name: Snakemake removes the outputs of a failed step,

@@ -39,13 +39,13 @@ from imubench_pipeline.tables.seals import name_place
 include: "bucket.smk"  # logs and results in an object store
 
 
-# The graph of a thousand recordings is millions of objects, which live as long as the run: to look
-# for garbage among them as often as Python does, and at the end, takes a fourth of the time.
+# The graph of a thousand recordings has millions of objects, which live as long as the run. With
+# Python's defaults, garbage collection among them takes a quarter of the time.
 gc.set_threshold(100_000, 20, 100)
 atexit.register(gc.freeze)
 
-# What is not complete was left by a killed run: at the beginning if it is older than a command of
-# somebody takes, at the end if nothing was done to it since the beginning.
+# Incomplete files are left by killed runs. At the beginning of a run these are the files that are too
+# old to be those of another command; at the end, the files that were not written since the beginning.
 BEGUN = time.time()
 
 HERE = workflow.current_basedir
@@ -84,9 +84,9 @@ except ConfigError as error:
 for reason in plan.unusable.values():
     logger.warning(str(reason))
 
-# What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
-# This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake;
-# records of failures and seals of files need results on a disk.
+# Snakemake calls the function `script` for the `script:` of a rule. This one forks a process that has
+# the imports. On a cluster, Snakemake repeats failed jobs itself. Records of failures and seals of
+# files need results on a disk.
 script = Scripts(
     plan.faults,
     None if workflow.remote_exec or bucket else make_step_limits(plan),
@@ -98,7 +98,7 @@ run_lock = Lock(locate_lock(plan.run.results))
 
 
 def take_lock():
-    """Take the lock on the results, as a run begins that has something to do."""
+    """Take the lock on the results, at the beginning of a run with something to do."""
     try:
         run_lock.acquire_unless_inherited()
     except TakenError as error:
@@ -106,7 +106,7 @@ def take_lock():
 
 
 def say_if_idle():
-    """Say what became of the files in the drop zone where nothing was to be done."""
+    """Print the state of the files in the drop zone, if the run has nothing to do."""
     is_run = (
         workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
     )
@@ -144,17 +144,17 @@ wildcard_constraints:
 
 
 def tables_of(*made):
-    """The tables that rules write into the folder of a recording."""
+    """Return the names of the tables that rules write into the folder of a recording."""
     return tuple(name for rule in made for name in rule.output.keys())
 
 
 def of_sensor(file):
-    """A file of every recording of a sensor."""
+    """Return a function for the paths of a file of every recording of a sensor."""
     return lambda w: [f"{folder}/{file}" for folder in FOLDERS[w.sensor]]
 
 
 def at_rest(file):
-    """A file of every static recording of a sensor."""
+    """Return a function for the paths of a file of every static recording of a sensor."""
     return lambda w: [
         f"{KEPT.format(sensor=w.sensor, recording=recording)}/{file}"
         for recording in plan.static_of(w.sensor)
@@ -162,29 +162,29 @@ def at_rest(file):
 
 
 def every(file):
-    """A file of every recording."""
+    """Return the paths of a file of every recording."""
     return [f"{folder}/{file}" for folders in FOLDERS.values() for folder in folders]
 
 
 def of_each(recordings, table):
-    """A table of some recordings."""
+    """Return the paths of a table of these recordings."""
     return [
         f"{KEPT.format(sensor=s, recording=r)}/{table}.parquet" for s, r in recordings
     ]
 
 
 def of_each_sensor(table, sensors=FOLDERS):
-    """A table of every sensor, or of some."""
+    """Return the paths of a table of every sensor, or of these."""
     return [f"{JOINED.format(sensor=sensor)}/{table}.parquet" for sensor in sensors]
 
 
 def table(name):
-    """A table of all sensors."""
+    """Return the path of a table of all sensors."""
     return str(locate_table(plan.run.results, name))
 
 
 def as_files(*tables):
-    """Tables of all sensors as they are written, by name."""
+    """Return the files of tables of all sensors (Parquet, and CSV if it is written), by name."""
     return {
         name: [directory(table(name)) if plan.has_parts(name) else table(name)]
         + [f"{RESULTS}/tables/{name}.csv"] * plan.writes_csv(name)
@@ -193,24 +193,27 @@ def as_files(*tables):
 
 
 def tried(step):
-    """How often a step was tried. One that has this fails for its recording or sensor alone."""
+    """Return a function for the number of attempts of a step.
+
+    A failed step with this parameter leaves out its recording or sensor, and does not end the run.
+    """
     return lambda w: (0 if bucket else plan.attempt(step, w.sensor, w.get("recording")))
 
 
 def log_of(sensor, recording):
-    """The files of a log that decide by their dates whether it is read again."""
+    """Return the files of a log whose dates decide whether it is read again."""
     found = plan.recordings[sensor, recording]
     return bucket.find_places(found.files) if bucket else found.inputs
 
 
 def source_of(sensor, recording):
-    """The file or folder of a log, or its copy."""
+    """Return the file or folder of a log, or its copy."""
     path = plan.recordings[sensor, recording].path
     return str(bucket.find_copy(bucket.find_places([path])[0]) if bucket else path)
 
 
-# On a disk the samples lie beside `quality.json`, and no rule declares them: only the log tells which
-# files there are. An object store has a folder of them.
+# On a disk, the samples are next to `quality.json`. No rule declares them, because their files depend
+# on the log. In an object store they have a folder.
 SAMPLES_OUTPUT = {}
 if bucket:
     SAMPLES_OUTPUT = {
@@ -222,20 +225,20 @@ SAMPLES_AT_REST = {"samples": at_rest("samples")} if bucket else {}
 
 
 ADDED_TABLES = {}
-"""The tables of all sensors that extensions add, with the files that they are joined from."""
+"""Tables of all sensors that extensions add, with the files that are joined to them."""
 
 ADDED_OUTPUTS = []
-"""Outputs of extensions that a run makes, and no other rule reads."""
+"""Outputs of extensions that are results of a run, and no inputs of other rules."""
 
 SAMPLED = set()
-"""Sensors whose samples stay, because a step reads all of them."""
+"""Sensors whose samples are never removed, because a step reads all of them."""
 
 JOBS = {}
-"""The wildcards of the jobs of a step that is not of every sensor or recording."""
+"""The wildcards of the jobs of a step, if it does not run for every sensor or recording."""
 
 
 def own_rules():
-    """The rules of this workflow by their names here; one that uses them may name them otherwise."""
+    """Return the rules of this workflow by name; a workflow that imports them may rename them."""
     folders = [HERE] + [
         infer_source_file(str(file.parent)) for file in files_of("rules")
     ]
@@ -244,7 +247,7 @@ def own_rules():
 
 
 def jobs():
-    """The wildcards and the settings of every job of this run, by the place of its seal."""
+    """Return wildcards and digest of the settings of every job, by the place of its seal."""
     found = {}
     for step, rule in own_rules().items():
         digests = {}
@@ -262,7 +265,7 @@ def jobs():
 
 
 def jobs_of(step, rule):
-    """The sensor and recording of each job of a step, by its rule."""
+    """Return the wildcards of each job of a step and its rule."""
     if step in JOBS:
         return JOBS[step]
     if "recording" not in rule.wildcard_names:
@@ -271,22 +274,22 @@ def jobs_of(step, rule):
 
 
 def jobs_of_each(recordings):
-    """The sensor and recording of the jobs of some recordings."""
+    """Return the wildcards of the jobs of these recordings."""
     return [{"sensor": sensor, "recording": name} for sensor, name in recordings]
 
 
 def jobs_of_recordings(dag):
-    """The recording of each job of this run that is of one."""
+    """Yield sensor and recording of the jobs of this run that have a recording."""
     for job in dag.needrun_jobs():
         if "recording" in job.wildcards.keys():
             yield job.wildcards.sensor, job.wildcards.recording
 
 
 def made_again(wildcards):
-    """The files of this run that are not as they were left; Snakemake is to make them anew.
+    """Return the files that are not as a run wrote them, so that Snakemake makes them again.
 
-    It does so by itself for what is missing and needed by a step that runs, and not for what is
-    another file, or is damaged.
+    Snakemake itself finds only missing files that a pending step needs, and no files that were
+    replaced or damaged.
     """
     if bucket:
         return []
@@ -314,7 +317,7 @@ def made_again(wildcards):
 
 
 def remove_samples():
-    """Remove the samples that the settings do not keep, where no job is left to do."""
+    """Remove the samples that the settings do not keep, if their recording has no pending job."""
     keep = plan.run.samples.keep
     if keep == "all" or bucket:
         return
@@ -342,12 +345,12 @@ def remove_samples():
 
 
 def leave_out_sound(pending):
-    """Hide the jobs of sensors and recordings without a pending one from Snakemake.
+    """Hide from Snakemake the jobs of sensors and recordings without a pending job.
 
-    Their files are inputs as any others: the graph of all jobs takes most of the time of a plan.
+    Their outputs become plain input files: the graph of all jobs takes most of the time of a plan.
     """
     asked = workflow.dag_settings
-    # Groups are of clusters; a dry run would take a third of its time to check them.
+    # Only clusters use groups; checking them takes a third of the time of a dry run.
     if workflow.dryrun:
         for made in own_rules().values():
             made.group = None

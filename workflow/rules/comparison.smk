@@ -1,4 +1,4 @@
-"""All sensors: their tables, and what follows of these."""
+"""Steps of all sensors: joined tables, ranking, shortlist."""
 
 
 rule tables:

@@ -1,4 +1,4 @@
-"""What one recording tells: its samples, their Allan variance, the noise, and what follows of it."""
+"""Steps of one recording: samples, Allan variance, noise parameters, and errors that follow."""
 
 
 rule simulate:
@@ -40,8 +40,8 @@ rule ingest:
         "../scripts/ingest.py"
 
 
-# The limits of this curve go by an identified power law; those of the table `allan`, which the next
-# step writes, by the spectrum that it fits.
+# The limits of this curve are for an identified power law. The limits in the table `allan`, which the
+# next step writes, are for the fitted spectrum.
 rule allan:
     input:
         **SAMPLES_INPUT,
@@ -186,7 +186,7 @@ rule error_budget:
 
 JOBS["simulate"] = jobs_of_each(plan.simulated)
 
-# What is kept of every recording, and those of its tables that its sensor's are joined from.
+# Outputs of every recording, and the tables among them that are joined to tables of its sensor.
 OF_RECORDING = (
     rules.ingest,
     rules.estimate,

@@ -1,4 +1,4 @@
-"""What is read: the pages of the report."""
+"""The pages of the report."""
 
 
 rule report:

@@ -1,4 +1,4 @@
-"""What all recordings of a sensor tell."""
+"""Steps of one sensor: joined tables of its recordings."""
 
 # `estimate_findings` becomes a part of `findings`.
 OF_SENSOR = sorted(

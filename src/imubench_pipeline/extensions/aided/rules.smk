@@ -1,4 +1,4 @@
-"""Filters on simulated drives, tuned by all that is known of a sensor."""
+"""Filters on simulated drives, tuned with each source of noise figures."""
 
 from imubench_pipeline.extensions.aided.plan import (
     dump_navigate_settings,

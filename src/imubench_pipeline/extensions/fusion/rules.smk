@@ -25,7 +25,7 @@ rule fusion:
         "scripts/fusion.py"
 
 
-# Only of recordings of boards, whose source compares samples by eye.
+# Only for recordings of boards: their paper compares samples by eye.
 rule samples_of_models:
     input:
         **SAMPLES_INPUT,

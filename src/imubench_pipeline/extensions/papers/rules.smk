@@ -1,4 +1,4 @@
-"""What the papers print, beside what is found."""
+"""Published figures of the papers, compared with results of this run."""
 
 
 rule papers:
