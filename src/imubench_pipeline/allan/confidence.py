@@ -62,8 +62,7 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
         correlation = max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
         delta = correlation / (1.0 + correlation)
         if delta < 0.25 or differenced == 2:
-            exponent = round(-2.0 * (delta + differenced))
-            return int(np.clip(exponent, -2, 2))
+            return int(np.clip(round(-2.0 * (delta + differenced)), -2, 2))
         good = good[1:] & good[:-1]
         series = np.where(good, np.diff(series), 0.0)
     raise AssertionError("the loop returns at its last turn")

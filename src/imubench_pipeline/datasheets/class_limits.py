@@ -191,10 +191,9 @@ def _list_statements(sensor: Sensor, channel: str, figure: str) -> Iterator[floa
 
 def _with_options(datasheet: Datasheet) -> Datasheet:
     """Return a datasheet with the options of the logged sensor, or else with all."""
-    sheets = (datasheet.gyro, datasheet.accel)
     printed = [
         figure.option
-        for sheet in sheets
+        for sheet in (datasheet.gyro, datasheet.accel)
         for name in (QuantityDatasheet.model_fields if sheet else ())
         for figure in (sheet.printed(name) if sheet else ())
         if figure.option is not None

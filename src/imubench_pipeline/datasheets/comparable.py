@@ -194,8 +194,7 @@ def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Compar
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
-    offsets = axis.read("offset", like, axis.si("offset"))
-    yield from offsets or [axis.unpublished(like, "offset")]
+    yield from axis.read("offset", like, axis.si("offset")) or [axis.unpublished(like, "offset")]
     name = "temperature_coefficient"
     yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
     for name, obstacle in texts.ONE_LOG_OBSTACLES.items():
@@ -219,10 +218,9 @@ def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
 
             assumed = stated == "unknown"
             reason = texts.density_side(sidedness, assumed=assumed)
-            like = Comparable("N", "N", None, sidedness, reason=reason, is_side_assumed=assumed)
             yield from axis.read(
                 "noise_density",
-                like,
+                Comparable("N", "N", None, sidedness, reason=reason, is_side_assumed=assumed),
                 convert,
                 [figure for figure in figures if figure.sidedness == stated],
             )

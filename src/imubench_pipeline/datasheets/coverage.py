@@ -79,8 +79,7 @@ def by_vendor(rows: Iterable[CoverageRow]) -> list[VendorCoverageRow]:
     """Count the rows of `coverage` by vendor, quantity and figure, in the order of the vendors."""
     counts: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
-        key = (row.vendor, row.quantity, row.figure)
-        counts.setdefault(key, Counter())[row.published] += 1
+        counts.setdefault((row.vendor, row.quantity, row.figure), Counter())[row.published] += 1
 
     def order(item: tuple[tuple[str, str, str], Counter[str]]) -> tuple[str, int, int]:
         vendor, quantity, figure = item[0]

@@ -109,8 +109,7 @@ def compute_fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
         return Parameter(None, "not_shown", texts.mean_is_not_gravity(norm))
     if abs(means[channel]) < _MIN_VERTICAL_COSINE * norm:
         return Parameter(None, "not_shown", texts.AXIS_NOT_VERTICAL)
-    deviation = norm - STANDARD_GRAVITY
-    return _bound_size(deviation, _MAX_GRAVITY_DEVIATION, texts.NORM_LESS_GRAVITY)
+    return _bound_size(norm - STANDARD_GRAVITY, _MAX_GRAVITY_DEVIATION, texts.NORM_LESS_GRAVITY)
 
 
 def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
@@ -264,8 +263,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     reasons = [reason for reason in (entry.reason, parameter.reason) if reason]
     if least != largest:
         reasons.append(texts.interval_spans(least, largest))
-    verdict = least if least == largest else "not sure"
-    return replace(row, verdict=verdict, reasons=tuple(reasons))
+    return replace(row, verdict=least if least == largest else "not sure", reasons=tuple(reasons))
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:

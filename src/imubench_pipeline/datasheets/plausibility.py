@@ -145,8 +145,7 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
         and row.value is not None
     ]
     if printed:
-        largest = min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET)
-        return largest, "datasheet"
+        return min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET), "datasheet"
     words = (sensor.price_class or "").lower().replace(",", " ").split()
     word = next((word for word in words if word in _MAX_OFFSET_OF_CLASS), None)
     if word is None:

@@ -187,8 +187,7 @@ def compute_curve_figures(model: NoiseModel, tau: Array) -> dict[str, Parameter]
     """Return the figures of a model's curve (`CURVE`), without limits, at averaging times, s."""
     models = convert_noise_model(model)
     if not models.terms.parameters:
-        nothing = Parameter(None, "not_shown", curves.NO_NOISE)
-        return dict.fromkeys(CURVE, nothing)
+        return dict.fromkeys(CURVE, Parameter(None, "not_shown", curves.NO_NOISE))
     bias = Parameter(None, "absent", curves.NO_BIAS_TERMS)
     if any(models.terms.biases):
         bias = Parameter(float(compute_curve_bias(models, float(tau[-1]))[0][0]))

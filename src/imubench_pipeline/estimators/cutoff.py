@@ -99,8 +99,7 @@ def find_cutoff(
     """
     usable = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
     if usable.sum() < MIN_BINS:
-        reason = texts.few_bins(int(usable.sum()), MIN_BINS)
-        return Cutoff(Parameter(None, "not_shown", reason))
+        return Cutoff(Parameter(None, "not_shown", texts.few_bins(int(usable.sum()), MIN_BINS)))
     rounding = resolution**2 / (12.0 * spectrum.rate)
     lowest = spectrum.rate / (2.0 * math.pi * MIN_PROCESS_SAMPLES)
     lowest = min(lowest, (stated or math.inf) / _STATED_RATIO)
@@ -306,8 +305,7 @@ class _Fits:
         at = self.spectrum.frequency, self.rate
         slow = self._slow * low_pass.slow(*at)[:, None]
         slow[:, 0] = self._slow[:, 0] * low_pass.flicker(*at)
-        columns = [white[:, None], slow]
-        return np.hstack(columns + [np.ones((len(white), 1))] * with_floor)
+        return np.hstack([white[:, None], slow] + [np.ones((len(white), 1))] * with_floor)
 
     def _fit(self, low_pass: Filter, with_floor: bool = False) -> _Trial:
         powers, cost = self._fit_powers(self._make_columns(low_pass, with_floor))

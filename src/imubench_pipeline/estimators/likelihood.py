@@ -246,9 +246,8 @@ class _InTheLog:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
-                posterior = self._posteriors[candidate.terms]
                 self.draws[maximum.terms] = white_level.merge_fast_draws(
-                    posterior, candidate.terms, number
+                    self._posteriors[candidate.terms], candidate.terms, number
                 )
             yield replace(candidate, maximum=maximum)
 

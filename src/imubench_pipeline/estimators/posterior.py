@@ -97,8 +97,7 @@ class Weighted:
         """Return indices of points drawn by weight, in random order (systematic resampling)."""
         ends = np.cumsum(self.weights)
         places = (np.arange(number) + rng.random()) / number * ends[-1]
-        which = np.minimum(np.searchsorted(ends, places), len(ends) - 1)
-        return rng.permutation(which)
+        return rng.permutation(np.minimum(np.searchsorted(ends, places), len(ends) - 1))
 
 
 def sample_adaptively(
@@ -234,8 +233,7 @@ class _Target:
     def first(self) -> Mixture:
         """Return a mixture about the best fit, with a component for each term that may be 0."""
         places = np.log(self.maximum.times)
-        best = self._approximate_normal(self.log_fitted, places, _MAX_SIGMA, self.problem)
-        components = [best]
+        components = [self._approximate_normal(self.log_fitted, places, _MAX_SIGMA, self.problem)]
         if self.terms > 1:
             components += [self._make_weak_component(term) for term in range(self.terms)]
         means, scales = (np.array(part) for part in zip(*components, strict=True))

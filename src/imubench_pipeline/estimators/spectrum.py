@@ -211,8 +211,7 @@ def _high_bins(
     """Average the ordinates of segments above a frequency in bins 5 % wide."""
     n = len(squares)
     frequency = np.arange(n) * rate / (2.0 * n)
-    first = int(np.searchsorted(frequency - 0.25 * rate / n, beyond - 1e-9 * beyond))
-    edges = [first]
+    edges = [int(np.searchsorted(frequency - 0.25 * rate / n, beyond - 1e-9 * beyond))]
     while (following := max(edges[-1] + 1, int(np.ceil(edges[-1] * WIDTH)))) < n:
         edges.append(following)
     starts = np.array(edges)

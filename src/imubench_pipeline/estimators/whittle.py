@@ -333,8 +333,7 @@ def make_whittle(
 
 def make_noise_model(maximum: Maximum) -> NoiseModel:
     """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
-    terms = maximum.terms
-    values = {letter: maximum.parameter(letter) for letter in terms.linear}
+    values = {letter: maximum.parameter(letter) for letter in maximum.terms.linear}
     processes = [
         GaussMarkov(float(B), float(time))
         for B, time in zip(maximum.biases, maximum.times, strict=True)

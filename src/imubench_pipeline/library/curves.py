@@ -229,9 +229,8 @@ def allan_variance(
         if samples.ndim == 1:
             given.check_present(samples, "the array")
             return of_samples(samples, None)
-    columns = given.read_columns(data, channels, units)
     return Curves(
         of_samples(column.in_si(name), name)
-        for name, column in columns.items()
+        for name, column in given.read_columns(data, channels, units).items()
         if name != TEMPERATURE
     )

@@ -213,8 +213,7 @@ class Estimates(ByChannel[ChannelEstimate]):
             "mode": mode,
             "rate": rate,
         }
-        content: str | bytes = find_function("export_estimates")(self, target, path, options)
-        return content
+        return find_function("export_estimates")(self, target, path, options)
 
     def __repr__(self) -> str:
         names = {estimate.model.name for estimate in self.values()}

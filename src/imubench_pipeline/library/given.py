@@ -184,8 +184,7 @@ def _name_columns(
     if array.ndim == 1 and (names is None or names in _CHANNELS_OF_QUANTITY.values()):
         names = [names[0] if names else CHANNELS[0]]
     if names is None or len(names) != count:
-        turned = table.shape[0] in (3, 6) and count > len(CHANNELS)
-        if turned:
+        if table.shape[0] in (3, 6) and count > len(CHANNELS):
             mend = "expected a row for each sample: transpose it, with .T"
         elif names is None:
             mend = (

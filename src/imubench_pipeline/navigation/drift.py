@@ -218,8 +218,7 @@ def _make_point(row: Estimated) -> tuple[float, ...]:
 def _explain_no_verdict(row: Estimated | None, count: float) -> str:
     status = _get_status(row)
     if status != "ok":
-        reason = row.reason if isinstance(row, ParameterRow) else None
-        return texts.status_reason(status, reason)
+        return texts.status_reason(status, row.reason if isinstance(row, ParameterRow) else None)
     if count < 0.0:
         return texts.VALUE_WITHOUT_LIMITS
     if count == 0.0:

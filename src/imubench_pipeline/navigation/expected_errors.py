@@ -194,8 +194,7 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
     }
     use = {name: parse_quantity(text, of) for name, (text, of) in stated.items() if text}
     if environment.temperature_change:
-        change = parse_difference(environment.temperature_change, "temperature")
-        use["temperature_change"] = change
+        use["temperature_change"] = parse_difference(environment.temperature_change, "temperature")
     for limit in requirement.by_dead_reckoning:
         yield Question(
             name,

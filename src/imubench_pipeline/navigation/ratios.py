@@ -103,8 +103,7 @@ class ComparedChannel:
     def unknown(self, tau: float) -> Iterator[str]:
         """Yield the parameters that are not determined and may matter at a tau in s."""
         total = self.variance(tau)
-        groups = [self.estimate.parameters, *self.estimate.further]
-        for group in groups:
+        for group in [self.estimate.parameters, *self.estimate.further]:
             for name, parameter in group.items():
                 if parameter.value is not None or parameter.status in ("absent", "not_shown"):
                     continue

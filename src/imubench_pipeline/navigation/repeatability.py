@@ -45,8 +45,7 @@ def repeatability_rows(
             if unknown:
                 assumptions.append(texts.POWER_CYCLES_ASSUMED)
             bias = estimate_turn_on_bias(value for _, value in several)
-            limits = bias.spread_lower, bias.spread_upper
-            spread = Parameter(bias.spread, "ok", None, *limits)
+            spread = Parameter(bias.spread, "ok", None, bias.spread_lower, bias.spread_upper)
         axis, name = PrintedAxis.of(sensors[sensor].datasheet, channel), "bias_repeatability"
         for entry in axis.read(name, Comparable(name, "spread", None), axis.si(name)):
             found = compare(entry, spread, tolerance)

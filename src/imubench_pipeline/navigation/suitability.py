@@ -139,8 +139,7 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[tuple[bool | 
             if measured in asked and measured not in has.without:
                 width = has.bandwidth.get(measured)
                 wide = None if width is None else width >= lowest
-                own = _list_known(width)
-                yield wide, Shortfall("bandwidth", measured, must.bandwidth, own)
+                yield wide, Shortfall("bandwidth", measured, must.bandwidth, _list_known(width))
     if must.rate is not None:
         least = parse_quantity(must.rate, "frequency")
         if has.logged_rate is not None and has.logged_rate >= least:

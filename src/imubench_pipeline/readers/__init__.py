@@ -64,8 +64,7 @@ def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
         file = _find_file(path, present, source, name)
         clock = ""  # the part of the file with a clock of its own: a topic, or a kind of message
         if source.variable is not None and not compressed.is_member(file):
-            own = find_format(file, log.reader).clock_of == "variable"
-            clock = source.variable if own else ""
+            clock = source.variable if find_format(file, log.reader).clock_of == "variable" else ""
         together.setdefault((file, clock), {})[name] = source
     files = []
     for (file, _), columns in sorted(together.items(), key=lambda item: item[0]):

@@ -128,8 +128,7 @@ class Bounded(Generic[T]):
             reason = f"ended the process with exit code {ended}"
             raise BoundError(reason, is_external=ended == -signal.SIGKILL) from None
         if returned:
-            result: T = value
-            return result
+            return value
         if isinstance(value, MemoryError):
             raise BoundError(f"took more than {self._memory >> 20} MiB of memory")
         raise value

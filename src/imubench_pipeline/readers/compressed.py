@@ -106,10 +106,9 @@ def unpack_zstd(data: bytes, most: int) -> bytes:
 
 
 def _create_zstd() -> zstd.ZstdDecompressor:
-    largest: dict[int, int] = {
-        zstd.DecompressionParameter.window_log_max: bounds.MAX_WINDOW.bit_length() - 1
-    }
-    return zstd.ZstdDecompressor(options=largest)
+    return zstd.ZstdDecompressor(
+        options={zstd.DecompressionParameter.window_log_max: bounds.MAX_WINDOW.bit_length() - 1}
+    )
 
 
 DECOMPRESSORS: Mapping[str, Callable[[], Any]] = {
@@ -249,8 +248,7 @@ _CORRUPT_DATA_ERRORS = (OSError, ValueError, zlib.error, lzma.LZMAError, zipfile
 def _make_corrupt_error(name: str, error: Exception) -> RecordingError:
     if isinstance(error, RecordingError):
         return error
-    reason = str(error)[:300]
-    return RecordingError(f"{name}: corrupt compressed data ({reason}); copy it again")
+    return RecordingError(f"{name}: corrupt compressed data ({str(error)[:300]}); copy it again")
 
 
 def open_bytes(path: Path) -> Bytes:

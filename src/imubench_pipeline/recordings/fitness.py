@@ -5,7 +5,6 @@ no such sensor is sold. Other doubts are reported with the figures.
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -17,6 +16,7 @@ from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.model.table import OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.reasons import simulations as texts
 
@@ -140,12 +140,10 @@ def judge_recordings(
 
     ``included``: recordings, as ``sensor/recording``, that are used in spite of doubts.
     """
-    by_recording: dict[Key, list[DoubtRow]] = defaultdict(list)
-    for doubt in doubts:
-        by_recording[_key(doubt)].append(doubt)
+    by_recording = group_rows(doubts, _key)
     rows = []
     for row in recordings:
-        own = by_recording[_key(row)]
+        own = by_recording.get(_key(row), [])
         verdict = judge_fitness(own) if row.status == "ok" else None
         named = f"{row.sensor}/{row.recording}" in included
         named &= all(doubt.code != BESIDE_MEASURED for doubt in own)

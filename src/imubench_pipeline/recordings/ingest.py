@@ -167,15 +167,13 @@ def _ingest(
         stamps = part.digest() if len(parts) > 1 else ""
         by_clock.setdefault((stamps, part.rows, base.rate), []).append(index)
     groups = list(by_clock.values())
-    static = names.kind == AT_REST
-    findings = _findings(parts, bases, groups, settings, scratch, static=static)
+    findings = _findings(parts, bases, groups, settings, scratch, static=names.kind == AT_REST)
     marked = [part.source.path.name for part in parts if part.source.simulated]
     if marked and notes.simulated is False:
         findings.append(find(files.SimulatedByMark(marked[0]), "warning", len(marked)))
     findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
-    simulated = bool(marked or notes.simulated or names.simulated)
-    names = replace(names, simulated=simulated)
+    names = replace(names, simulated=bool(marked or notes.simulated or names.simulated))
     started = notes.started or next((p.source.started for p in parts if p.source.started), None)
     describe = partial(
         LogMetadata,
@@ -259,8 +257,7 @@ def _findings(
     findings = [finding for file in read_files for finding in file.findings]
     findings += [finding for file in read_files for finding in file.contradicted_units()]
     for part, base in zip(parts, bases, strict=True):
-        columns = part.columns | part.left_out
-        found = check_columns(columns, base.rate, settings, static=static)
+        found = check_columns(part.columns | part.left_out, base.rate, settings, static=static)
         knocks: dict[str, list[Knock]] = {}
         if static:  # a turn looks like a knock
             longest = round(settings.longest_knock * base.rate)

@@ -60,8 +60,7 @@ class KnownFile:
         if (before.st_size, _stamps(before)) != (after.st_size, _stamps(after)):
             return cls(before.st_size, None, None)
         old = all(abs(begin - stamp) > _STAMP_RESOLUTION for stamp in _stamps(before))
-        stamps = _stamps(before) if old else None
-        return cls(before.st_size, digest, stamps, inode=before.st_ino)
+        return cls(before.st_size, digest, _stamps(before) if old else None, inode=before.st_ino)
 
 
 @cache
@@ -72,8 +71,7 @@ def _make_adapter() -> TypeAdapter[dict[str, KnownFile]]:
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        files = seals.read_sealed_json(folder / KNOWN)["files"]
-        return _make_adapter().validate_python(files)
+        return _make_adapter().validate_python(seals.read_sealed_json(folder / KNOWN)["files"])
     return None
 
 

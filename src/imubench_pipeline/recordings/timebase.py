@@ -226,11 +226,9 @@ def _describe_grid(track: tracking.Track, interval: float) -> list[Finding]:
         times = [point * interval for point in track.starts[1:]]
         findings.append(_describe_segments(times, track.jumps[1:], has_grid=True))
     if track.duplicates:
-        repeated = time_base.RepeatedStamps(track.duplicates)
-        findings.append(find(repeated, "note", track.duplicates))
+        findings.append(find(time_base.RepeatedStamps(track.duplicates), "note", track.duplicates))
     if track.unstamped:
-        unstamped = time_base.MissingStamps(track.unstamped)
-        findings.append(find(unstamped, "warning", track.unstamped))
+        findings.append(find(time_base.MissingStamps(track.unstamped), "warning", track.unstamped))
     return findings
 
 

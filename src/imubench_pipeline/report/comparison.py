@@ -152,8 +152,7 @@ class Comparison:
         for recording in recordings:
             self.channels += [channel.among(self.arrays) for channel in recording.channels]
             for channel, lines in recording.datasheet.items():
-                own = self._datasheets.setdefault(recording.view.sensor, {})
-                own.setdefault(channel, lines)
+                self._datasheets.setdefault(recording.view.sensor, {}).setdefault(channel, lines)
             for quantity in QUANTITY_NAMES:
                 self._lines[quantity] += recording.lines[quantity]
 

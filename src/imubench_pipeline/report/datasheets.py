@@ -81,13 +81,11 @@ def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
     A bias instability is judged by the minimum of the curve, as vendors print it. If a density may
     be one-sided or two-sided and the two verdicts differ, the verdict is `DEPENDS`.
     """
-    minima = [row for row in readings if row.statistic == "adev_minimum"]
-    judged = minima or list(readings)
+    judged = [row for row in readings if row.statistic == "adev_minimum"] or list(readings)
     verdicts = list(dict.fromkeys(row.verdict for row in judged))
     if len(verdicts) == 1:
         return verdicts[0], "; ".join(judged[0].reasons)
-    each = "; ".join(f"as {row.sidedness}: {row.verdict}" for row in judged)
-    return DEPENDS, each
+    return DEPENDS, "; ".join(f"as {row.sidedness}: {row.verdict}" for row in judged)
 
 
 DEPENDS = "depends on whether the density is one-sided"

@@ -148,8 +148,7 @@ def render_log_screen(
         events = [] if motion else group_events(others)[:_MAX_EVENTS]
         doubting = [n for n, event in enumerate(events, start=1) if event.casts_doubt()]
         moved = any(each.finding in ("motion", "turning") for each in findings)
-        state = state_text(row, length, doubting, moved)
-        yield Text(_fold(state, width, 6), style="bold")
+        yield Text(_fold(state_text(row, length, doubting, moved), width, 6), style="bold")
         if row.status != "ok":
             yield Text()
             continue

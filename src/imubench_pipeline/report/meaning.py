@@ -255,8 +255,7 @@ def make_budget_tables(
         times = list(dict.fromkeys(row.time for row in parts))
         lines: dict[tuple[str, tuple[float | None, ...]], Json] = {}
         missing: dict[str, None] = {}
-        by_axis = group_rows(parts, lambda row: (row.error, row.axis))
-        for (error, axis), chosen in by_axis.items():
+        for (error, axis), chosen in group_rows(parts, lambda row: (row.error, row.axis)).items():
             sigmas = tuple(row.sigma for row in chosen if row.source == "total")
             if not any(sigmas):
                 missing[f"{_NAMES[error]}: {'; '.join(chosen[0].reasons) or 'not known'}"] = None

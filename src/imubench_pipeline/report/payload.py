@@ -291,5 +291,4 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
 
 
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
-    names = ("low", "high", "mean")
-    return {n: arrays.even([getattr(row, n) for row in rows]) for n in names}
+    return {n: arrays.even([getattr(row, n) for row in rows]) for n in ("low", "high", "mean")}

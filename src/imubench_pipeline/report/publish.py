@@ -309,7 +309,6 @@ def _make_assets() -> dict[str, str]:
     *own, last = (_STATIC_FOLDER / f"{name}.js" for name in _SCRIPT_NAMES)
     added = (path for folder in files_of("static") for path in sorted(folder.glob("*.js")))
     parts = [path.read_text(encoding="utf-8") for path in (*own, *added, last)]
-    terms = {key: entry.short for key, entry in read_glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
         for name, value in (
@@ -317,7 +316,7 @@ def _make_assets() -> dict[str, str]:
             ("DIGITS", digit_limits()),
             ("STATUS_NAMES", STATUS_WORDS),
             ("SYMBOL_TEXTS", {symbol: symbol_text(symbol) for symbol in SHOWN}),
-            ("TERMS", terms),
+            ("TERMS", {key: entry.short for key, entry in read_glossary().items()}),
             ("TERM_COLOURS", TERM_COLOURS),
             ("AXIS_LOOKS", {axis: asdict(look) for axis, look in AXIS_STYLES.items()}),
             ("GRADES", {quantity: read_grade_limits(quantity) for quantity in QUANTITIES}),
@@ -384,5 +383,4 @@ def load_site(results: Path) -> Site:
     paths = {name: locate_table(results, name) for name in names}
     for path in paths.values():
         path.stat()  # its error names the missing file, unlike the error of Parquet
-    tables = {name: read(name, [path]) for name, path in paths.items()}
-    return make_site(tables, settings, results)
+    return make_site({name: read(name, [path]) for name, path in paths.items()}, settings, results)

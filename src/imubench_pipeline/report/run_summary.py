@@ -158,8 +158,7 @@ def list_best_sensors(
     for name, own in group_rows(deciding, lambda row: row.requirement).items():
         ranked = [row for row in own if row.rank is not None]
         ranked.sort(key=lambda row: (row.rank, -(row.margin or 0.0)))
-        excluded = sum(row.verdict == "excluded" for row in own)
-        text = answer_text(ranked, names, len(own), excluded)
+        text = answer_text(ranked, names, len(own), sum(row.verdict == "excluded" for row in own))
         if ranked and ranked[0].tied_with:
             others = join_names([names.get(each, each) for each in ranked[0].tied_with])
             text += f" The difference from {others} is not significant."

@@ -67,12 +67,11 @@ SHORTLIST = Entry(
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:
     """Return rank, sensor, verdict, margins (in use, noise, likely), and limit or reason."""
-    margins = (row.margin, row.noise_margin, row.likely_margin)
     return [
         str(row.rank or "–"),
         row.sensor + " *" * (row.basis != "printed"),
         SHORT_VERDICTS[row.verdict],
-        *(number_text(margin, 3) for margin in margins),
+        *(number_text(margin, 3) for margin in (row.margin, row.noise_margin, row.likely_margin)),
         row.decides or "; ".join(row.reasons) or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
 

@@ -149,8 +149,7 @@ class Site:
     @property
     def system(self) -> System:
         """Initial units of the pages."""
-        system: System = self.settings["report"]["units"]
-        return system
+        return self.settings["report"]["units"]
 
     @property
     def results_name(self) -> str:
@@ -164,8 +163,7 @@ class Site:
 
     def on_purpose(self, view: RecordingView) -> Mapping[str, str]:
         """Return, by finding, why a simulated recording has it; empty if none is intended."""
-        shown: Mapping[str, Mapping[str, str]] = self.settings.get("on_purpose", {})
-        return shown.get(f"{view.sensor}/{view.name}", {})
+        return self.settings.get("on_purpose", {}).get(f"{view.sensor}/{view.name}", {})
 
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that recomputes the results of a recording, up to a table."""
@@ -238,8 +236,7 @@ class Site:
 
     def is_sold(self, sensor: str) -> bool:
         """Return whether a sensor can be bought; True if it has no sensor file."""
-        sold: bool = self.settings["sensors"].get(sensor, {}).get("sold", True)
-        return sold
+        return self.settings["sensors"].get(sensor, {}).get("sold", True)
 
     @cached_property
     def looks(self) -> dict[str, Appearance]:

@@ -73,8 +73,7 @@ def render_comparison(
     warnings = []
     for row in run_summary.select_warnings(findings):
         place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
-        text = finding_text(row, system)
-        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {text}")
+        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {finding_text(row, system)}")
     yield from _listed("Warnings", warnings)
     yield from _listed("What to do next", _list_next_steps(tables["next_steps"]))
     ranking = RankingRow.rows_of(tables["ranking"])
@@ -278,8 +277,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
 def _parameter_lines(
     quantity: str, rows: Sequence[ParameterRow], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
-    symbols = select_symbols(rows)
-    units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in symbols}
+    units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in select_symbols(rows)}
     by_channel = group_rows(rows, lambda row: (row.sensor, row.recording, row.channel))
     lines: list[list[str | Text]] = []
     alone = len(about) == 1  # its name is above

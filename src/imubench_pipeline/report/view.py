@@ -223,8 +223,7 @@ class RecordingView:
     @property
     def channel_names(self) -> list[str]:
         """Names of its channels, which are read from the table ``allan``."""
-        names: list[str] = self.parts["allan"]["channel"].unique().to_pylist()
-        return names
+        return self.parts["allan"]["channel"].unique().to_pylist()
 
     def channels(self) -> list[ChannelView]:
         """Return the data of its channels, made from the tables in each call."""

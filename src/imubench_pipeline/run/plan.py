@@ -320,9 +320,8 @@ class Plan:
                 f"no sensor file {expected} for the logs in {self.run.logs / recording.sensor}; "
                 "write one, or move the logs to the folder of their sensor"
             )
-        sensor = self.sensors[recording.sensor]
         return sensor_files.merged_log(
-            sensor, notes, str(recording.notes or recording.sensor)
+            self.sensors[recording.sensor], notes, str(recording.notes or recording.sensor)
         ), notes
 
     def estimate_settings(self, sensor: str, name: str) -> str:
@@ -395,8 +394,7 @@ class Plan:
     def ranking_settings(self) -> str:
         """Return, as JSON, the settings of the ranking: requirements, and sensors for sale."""
         sensors = self._for_sale()
-        requirements = self._requirements(*_REPORT_KEYS)
-        return to_json({"requirements": requirements, "sensors": sensors})
+        return to_json({"requirements": self._requirements(*_REPORT_KEYS), "sensors": sensors})
 
     def _for_sale(self) -> dict[str, dict[str, object]]:
         return {

@@ -114,8 +114,7 @@ def _request(
         connection.send(job)
         if connection.recv() is None:  # it begins
             if connection.poll(seconds):
-                outcome: dict[str, float] | StepError = connection.recv()
-                return outcome
+                return connection.recv()
             connection.send(None)  # any message ends the step
             connection.poll(_MAX_KILL_TIME)
             reason = f"ran for longer than {seconds:.4g} s"

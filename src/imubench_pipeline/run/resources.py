@@ -144,8 +144,7 @@ def _make_extent_lookup(plan: Plan) -> Callable[[str | None, str | None], Extent
 
 def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
     if recording.simulated:
-        text = plan.simulated_settings(recording.sensor, recording.name)
-        made = json.loads(text)["recording"]
+        made = json.loads(plan.simulated_settings(recording.sensor, recording.name))["recording"]
         seconds = parse_quantity(made["duration"], "time")
         samples = seconds * parse_quantity(made["rate"], "frequency")
         return Extent(samples / 1e6, len(made["channels"]))

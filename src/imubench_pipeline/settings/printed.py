@@ -260,8 +260,7 @@ class QuantityDatasheet(Strict):
 
     def printed(self, name: str) -> tuple[PrintedFigure, ...]:
         """Return the published figures of one kind, such as ``noise_density``."""
-        figures: tuple[PrintedFigure, ...] = getattr(self, name) or ()
-        return tuple(figure for figure in figures if figure.value is not None)
+        return tuple(figure for figure in getattr(self, name) or () if figure.value is not None)
 
     def looked_up(self, name: str) -> bool:
         """Return whether the sensor file has a figure ``name``, even as null (not published)."""

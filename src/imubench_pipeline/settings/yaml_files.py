@@ -100,8 +100,7 @@ class _Loader(_SAFE):
             if not isinstance(node, yaml.ScalarNode):
                 raise
             kind = node.tag.rpartition(":")[2]
-            problem = f"{cut(node.value)} is no {cut(kind, str)}"
-            raise _make_fault(node, problem) from error
+            raise _make_fault(node, f"{cut(node.value)} is no {cut(kind, str)}") from error
 
 
 _Loader.add_constructor(f"{_TAG_PREFIX}int", _Loader.construct_integer)

@@ -69,7 +69,6 @@ def curve_of(
 
 def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]:
     """Read the Allan variances of a recording by channel; `samples`: their lengths with gaps."""
-    by_channel = split_table(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
             tau=table["tau"].to_numpy(),
@@ -81,7 +80,7 @@ def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]
             share=table["share"].to_numpy(),
             **_read_degrees(table),
         )
-        for (channel,), table in by_channel.items()
+        for (channel,), table in split_table(read("allan", [path]), "channel").items()
     }
 
 
@@ -97,10 +96,9 @@ def read_compensated_curves(
     path: Path, measured: Mapping[str, AllanCurve]
 ) -> dict[str, AllanCurve]:
     """Read the curves of ``allan_compensated`` by channel; `measured`: the uncompensated curves."""
-    by_channel = split_table(read("allan_compensated", [path]), "channel")
     return {
         channel: replace(
             measured[channel], variance=table["adev"].to_numpy() ** 2, **_read_degrees(table)
         )
-        for (channel,), table in by_channel.items()
+        for (channel,), table in split_table(read("allan_compensated", [path]), "channel").items()
     }

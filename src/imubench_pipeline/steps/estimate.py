@@ -131,8 +131,7 @@ def estimate_channel(
         recommended = into.estimates[key.channel].get(best)
         N = recommended.parameters["N"].value if recommended else None
         into.add_findings(key, spectral_findings(key.channel, channel.fitted.frame, N))
-    bias = model.FixedBiasRow(**asdict(key), value=channel.mean, unit=channel.unit)
-    into.fixed_bias.append(bias)
+    into.fixed_bias.append(model.FixedBiasRow(**asdict(key), value=channel.mean, unit=channel.unit))
 
 
 class _Channel:

@@ -74,8 +74,7 @@ def reconstruct(
     )
     quantiles = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
     of_model = np.sqrt(model.allan_variance(measured.tau, rate))
-    error = 1.0 / np.sqrt(2.0 * measured.edf)
-    scores = score(measured.deviation, error, of_model, deviations)
+    scores = score(measured.deviation, 1.0 / np.sqrt(2.0 * measured.edf), of_model, deviations)
     points = np.column_stack([measured.tau, *quantiles, reconstructed]).tolist()
     rows = [
         ReconstructionRow(

@@ -40,5 +40,4 @@ def write_shortlist(
 ) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
     requirements = validate_requirements(json.loads(settings)["requirements"])
-    rows = list_shortlist(requirements, sensors_of(catalogue), tables)
-    write_each({"shortlist": rows}, outputs)
+    write_each({"shortlist": list_shortlist(requirements, sensors_of(catalogue), tables)}, outputs)

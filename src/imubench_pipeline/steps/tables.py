@@ -24,10 +24,9 @@ def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     recordings, new = exclude_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:
         return tables
-    doubts = [*new, *DoubtRow.rows_of(tables["doubts"])]
     return tables | {
         "recordings": build("recordings", recordings),
-        "doubts": build("doubts", doubts),
+        "doubts": build("doubts", [*new, *DoubtRow.rows_of(tables["doubts"])]),
         **{
             name: build(name, attach_doubts(WITH_DOUBTS[name].rows_of(tables[name]), recordings))
             for name in WITH_DOUBTS.keys() & tables.keys()

@@ -163,8 +163,7 @@ def write_arrow(table: pa.Table, path: Path) -> None:
                 write_csv(table, file)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
-            compression = "zstd" if table.nbytes > _SMALL else "snappy"
-            write_sealed(table, temporary, compression)
+            write_sealed(table, temporary, "zstd" if table.nbytes > _SMALL else "snappy")
 
 
 def link_part(name: str, part: pa.Table, stored: Path, folder: Path) -> None:
@@ -240,8 +239,7 @@ def read_part(table: str, path: Path, *, any_version: bool = False) -> pa.Table:
                 field.nullable or pa.types.is_list(field.type)
             ):
                 part = part.append_column(field, pa.nulls(len(part), field.type))
-        known = [name for name in expected.names if name in part.column_names]
-        part = part.select(known)
+        part = part.select([name for name in expected.names if name in part.column_names])
     if other := _other_columns(part.schema, expected):
         raise TableError(
             f"{path} was made by another version of imubench_pipeline: {other}; run snakemake -c2 "

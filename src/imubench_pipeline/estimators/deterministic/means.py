@@ -86,8 +86,7 @@ def _compute_block_moments(values: Array) -> Array:
     present = np.isfinite(values)
     if present.all():
         power = np.mean(np.diff(values, axis=1) ** 2, axis=1) if values.shape[1] > 1 else 0.0
-        parts = np.broadcast_arrays(values.mean(axis=1), 0.5 * power, 1.0)
-        return np.array(parts)
+        return np.array(np.broadcast_arrays(values.mean(axis=1), 0.5 * power, 1.0))
     count = present.sum(axis=1)
     mean = np.where(present, values, 0.0).sum(axis=1) / np.maximum(count, 1)
     squares = np.diff(values, axis=1) ** 2

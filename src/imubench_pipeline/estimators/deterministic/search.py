@@ -130,8 +130,7 @@ def find_best_scores(
             best = int(np.argmax(gains))
             candidate = Regressor(kind, part, float(where[best]))
             # Half of the tried time constants and periods are independent.
-            threshold = compute_threshold(chance, 0.5 * len(where))
-            yield Score(candidate, float(gains[best]), threshold)
+            yield Score(candidate, float(gains[best]), compute_threshold(chance, 0.5 * len(where)))
 
 
 def list_restarts(means: Means) -> list[Regressor]:
@@ -167,11 +166,10 @@ def _tabulate(n: int) -> list[tuple[RegressorKind, Array, Array]]:
         math.sqrt(n / few) * Regressor("sinusoid", 0, c / few).coefficients(few)[:, : 4 * most]
         for c in cycles
     ]
-    ramp = Regressor("ramp", 0).coefficients(n)
     return [
         ("exponential", times, np.array(decays)),
         ("sinusoid", cycles / n, np.array(waves)),
-        ("ramp", np.zeros(1), ramp[None]),
+        ("ramp", np.zeros(1), Regressor("ramp", 0).coefficients(n)[None]),
     ]
 
 
@@ -207,8 +205,7 @@ def search_signals(ordinates: Ordinates) -> SearchResult:
                 better, most = tried, gain - threshold
         if better is None:
             break
-        last = len(better.regressors) - 1
-        moved = polish(ordinates, better.regressors, last, better.density)
+        moved = polish(ordinates, better.regressors, len(better.regressors) - 1, better.density)
         fit = ordinates.fit(moved, better.density)
     if _is_full(fit):
         return SearchResult(fit, (), True)

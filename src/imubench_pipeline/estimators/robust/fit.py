@@ -191,9 +191,8 @@ class _Points:
     def covariance(self, model: NoiseModel, expected: Array, samples: int) -> Array:
         """Return the covariance of relative Allan variances of a log with a model, shape (m, m)."""
         curve = self.curve
-        stochastic = replace(model, R=0.0)
         covariance = compute_variance_covariance(
-            stochastic, curve.rate, samples, curve.cluster_size
+            replace(model, R=0.0), curve.rate, samples, curve.cluster_size
         )
         covariance /= np.outer(expected, expected) * np.sqrt(np.outer(curve.share, curve.share))
         error = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))

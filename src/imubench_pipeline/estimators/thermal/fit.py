@@ -52,8 +52,7 @@ def add_temperature_effect(
     """Yield the blocks of a log with ``effect`` added: SI, at the knots of ``path``, shape (k,)."""
     reached = 0
     for values in blocks:
-        points = np.arange(reached, reached + len(values))
-        yield values + path.at(points, effect)
+        yield values + path.at(np.arange(reached, reached + len(values)), effect)
         reached += len(values)
 
 
@@ -97,8 +96,7 @@ def fit_temperature(
         # Without an effect, the fitted lag only makes a random walk look like temperature.
         lags = np.zeros(1)
         effect = regression.fit(effect.shape, lags)
-        lagless = _describe(regression, effect, lags, before, bias, length)
-        fitted = replace(lagless, lag=fitted.lag)
+        fitted = replace(_describe(regression, effect, lags, before, bias, length), lag=fitted.lag)
     return fitted
 
 

@@ -41,8 +41,7 @@ def make_axis_states(
     ``turn_on`` and ``scale`` are standard deviations of turn-on bias, SI, and relative scale-factor
     error. Processes represent flicker noise from the tau ``shortest`` to ``longest``, s.
     """
-    terms = model.realised(shortest, longest)
-    spaces = [term.state_space(1.0 / sampling) for term in terms]
+    spaces = [term.state_space(1.0 / sampling) for term in model.realised(shortest, longest)]
     return AxisStates(add_turn_on_bias(StateSpace.together(spaces), turn_on), scale)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.numbers import NO_VALUE, counted, number_text, percent_text
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -107,10 +108,7 @@ NAVIGATION = Entry(
 
 def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[TuningAnswer]:
     """Yield whether the tuning matters to the position after the longest outage, by sensor."""
-    groups: dict[tuple[str, str | None, str | None], list[NavigationRow]] = {}
-    for row in rows:
-        groups.setdefault((row.sensor, row.trajectory, row.signals), []).append(row)
-    for own in groups.values():
+    for own in group_rows(rows, lambda row: (row.sensor, row.trajectory, row.signals)).values():
         longest = max(row.outage or 0.0 for row in own)
         last = [row for row in own if row.outage == longest and row.tuning != "true"]
         known = [row for row in last if row.position_ratio is not None]

@@ -134,8 +134,7 @@ TRAJECTORY_NAMES = tuple(_MOTIONS)
 def simulate_trajectory(name: str, duration: float, sampling: float) -> Trajectory:
     """Return a trajectory of `TRAJECTORY_NAMES`; ``duration`` in s, ``sampling`` in Hz."""
     moves, gnss = _MOTIONS[name]
-    time = np.arange(round(duration * sampling) + 1) / sampling
-    motion = moves(time, sampling)
+    motion = moves(np.arange(round(duration * sampling) + 1) / sampling, sampling)
     velocity = np.column_stack(
         [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
     )
@@ -214,8 +213,7 @@ def simulate_signals(
             measured[i] = (1.0 + scale) * true[i] + _average_blocks(slow, block) + white
             bias[i] = slow[at * block - 1]
         else:
-            course = np.repeat(true[i], block)
-            motion = partial(_slice_course, course)
+            motion = partial(_slice_course, np.repeat(true[i], block))
             log = simulate(model, rate, L * block, rng, true=motion, temperature=temperature)
             measured[i] = _average_blocks(log, block)
     rng = channel_rng(seed, *names, "gnss")

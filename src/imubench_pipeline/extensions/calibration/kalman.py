@@ -87,8 +87,7 @@ class RateFilter:
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
         states = discretise_blocks(model, blocks, turn_on_bias)
-        start = np.array([[rate_sigma]])
-        self._filter = BlockFilter((states,), blocks.seen[:, None, None], start)
+        self._filter = BlockFilter((states,), blocks.seen[:, None, None], np.array([[rate_sigma]]))
 
     @property
     def rate_sigma(self) -> Array:

@@ -51,8 +51,7 @@ def take_static_noise(
 
     for row, folder in find_static_recordings(folders, far):
         parameters = folder / "parameters.parquet"
-        joint = folder / "draws.parquet" if draws else None
-        best = read_recommended_estimates(parameters, joint)
+        best = read_recommended_estimates(parameters, folder / "draws.parquet" if draws else None)
         gyros = [name for name in best if name.startswith("gyro_") and best[name].model.N]
         if gyros:
             name = min(gyros, key=lambda name: (name != channel, name))
@@ -99,8 +98,7 @@ def lend_axes(channels: Collection[str]) -> dict[str, str]:
     for channel in CHANNELS:
         own = [name for name in channels if quantity_of(name) == quantity_of(channel)]
         if own:
-            other = own["xyz".index(channel[-1]) % len(own)]
-            lent[channel] = channel if channel in own else other
+            lent[channel] = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
     return lent
 
 

@@ -33,8 +33,7 @@ def simulate_rate_table(recording: SimulatedRecording, rate: float) -> dict[str,
     rates = np.repeat([parse_quantity(step.rate, "angular_rate") for step in table.steps], 2)
     true = np.interp(np.arange(recording.samples) / rate, times, rates)
     earth = 0.0 if table.axis is None else table.axis.pointing.rate
-    indicated = make_sampled(table.scale_factor * (true + earth), rate)
-    return {str(recording.moved_gyro): indicated}
+    return {str(recording.moved_gyro): make_sampled(table.scale_factor * (true + earth), rate)}
 
 
 def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, Profile]:

@@ -74,10 +74,9 @@ def discretise_blocks(
     kinds, which = np.unique(
         np.stack([gaps, blocks.stop - blocks.start]), axis=1, return_inverse=True
     )
-    steps = tuple(_build_step(whole, int(gap), int(size)) for gap, size in kinds.T)
     return BlockStates(
         factor_covariance(whole.initial_variance),
-        steps,
+        tuple(_build_step(whole, int(gap), int(size)) for gap, size in kinds.T),
         which.ravel(),
         np.sqrt(white / blocks.count),
     )

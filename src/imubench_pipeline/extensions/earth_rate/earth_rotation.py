@@ -93,8 +93,7 @@ def make_earth_rate_tables(
     for row in _earth_rate(key, logs[channel], declared, source, how, metadata.begins):
         rows[row.table].append(row)
     if simulated is not None and turns is not None:
-        published = _published(key, simulated, turns, rows["earth_rate"])
-        rows["earth_rate_published"] = list(published)
+        rows["earth_rate_published"] = list(_published(key, simulated, turns, rows["earth_rate"]))
     return rows
 
 

@@ -141,8 +141,7 @@ class Outlook:
         number = np.concatenate([number, between])
         order = np.argsort(number)
         number = number[order]
-        dwell = (run_time - (number - 1) * self.turning) / number
-        return DwellCurve(number, dwell, sigma[order])
+        return DwellCurve(number, (run_time - (number - 1) * self.turning) / number, sigma[order])
 
     def _compute_sigma(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
         """Return the bound of a run for these numbers of dwells, shape (k,)."""
@@ -195,8 +194,7 @@ def prediction_rows(
         time = outlook.run_time(dwell, turns)
         # The reached value: the last necessary turn may give far more than the goal.
         sigma = outlook.sigma_after(dwell, turns)
-        needed = row(of="goal", goal=goal, dwell=dwell, turns=turns, time=time)
-        yield _add_sigma(needed, sigma)
+        yield _add_sigma(row(of="goal", goal=goal, dwell=dwell, turns=turns, time=time), sigma)
     sigmas = outlook.sigmas_after(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
     shown = np.rint(np.geomspace(1, len(sigmas), _TIME_CURVE_POINTS)).astype(np.int64)
     for turns in np.unique(shown).tolist():

@@ -519,8 +519,7 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
 def _describe_missing_axes(row: AlignmentRow) -> str:
     lent_axes = []
     for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
-        pairs = zip("xyz", channels, strict=True)
-        lent = [axis for axis, channel in pairs if channel[-1] != axis]
+        lent = [axis for axis, channel in zip("xyz", channels, strict=True) if channel[-1] != axis]
         if lent:
             lent_axes.append(f"{words} {' and '.join(lent)}")
     if not lent_axes:

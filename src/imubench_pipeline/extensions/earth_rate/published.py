@@ -181,10 +181,9 @@ class AllowedSigmas:
 def compute_allowed_sigmas(design: Experiment, model: NoiseModel) -> AllowedSigmas:
     """Return the standard deviations that the noise of a model gives the estimates of a run."""
     blocks = design.blocks(choose_block_length(design, model))
-    zero_means = np.zeros((1, len(blocks)))
     return AllowedSigmas(
         white=compute_white_sigma(model, blocks),
-        sigma=float(by_pairs(zero_means, blocks, model).sigma[-1]),
+        sigma=float(by_pairs(np.zeros((1, len(blocks))), blocks, model).sigma[-1]),
         sigma_filter=float(RateFilter(blocks, model).rate_sigma[-1]),
     )
 

@@ -153,6 +153,5 @@ def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str
     peaks = peaks * parse_quantity(turns.transient, "angular_rate")
     true = compute_true_rate(design, EARTH_RATE, peaks)
     before = np.full(round(turns.seconds("start") * rate), true[0])
-    after = np.full(samples, true[-1])
-    sensed = np.concatenate([before, true, after])[:samples]
+    sensed = np.concatenate([before, true, np.full(samples, true[-1])])[:samples]
     return {str(recording.moved_gyro): make_sampled(sensed, rate)}

@@ -219,8 +219,7 @@ def _merge_events(
 def find_outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
     """Return start and stop of outliers, s, of a log, shape (n,), merged within a block."""
     size = round(blocks.length * rate)
-    residual = log - np.repeat(blocks.level, size)[: len(log)]
-    away = np.abs(residual)
+    away = np.abs(log - np.repeat(blocks.level, size)[: len(log)])
     noise = float(np.nanmedian(away)) / 0.6745
     out = np.flatnonzero(away > _OUTLIER_SIGMAS * max(noise, blocks.sigma))
     if len(out) == 0:

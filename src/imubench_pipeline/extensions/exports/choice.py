@@ -116,8 +116,7 @@ def choose(
             for why, of_recordings in others.items()
         ]
         notes += parameter_notes(estimate, determined)
-        noise = AxisNoise(estimate.model, origin, notes)
-        return Choice(*key, noise, determined)
+        return Choice(*key, AxisNoise(estimate.model, origin, notes), determined)
 
     each = {
         name[-1]: take([name], "estimate")

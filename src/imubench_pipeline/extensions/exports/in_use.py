@@ -58,8 +58,7 @@ def measure_in_use(samples: Array, rate: float, cutoff: float = MOTION_CUTOFF) -
         )
     spectra = [welch(detrend(part), rate, nperseg=size) for part in parts]
     frequency = spectra[0][0]
-    weights = [len(part) for part in parts]
-    density = np.average([own for _, own in spectra], axis=0, weights=weights)
+    density = np.average([own for _, own in spectra], axis=0, weights=[len(part) for part in parts])
     step = float(frequency[1])
     slow = (frequency > 0.0) & (frequency < cutoff)
     band = (frequency >= cutoff) & (frequency < 0.5 * rate)

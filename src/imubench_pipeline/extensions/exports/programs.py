@@ -321,11 +321,10 @@ def fill_layout(
     """
     mapped = map_models(imu, program)
     about = describe(imu, program, mapped) + (remark(mapped) if remark else [])
-    numbers = {of: format_entries(program, imu, mapped, of) for of in ("gyro", "accel", "both")}
     return program.layout.format(
         head=format_comments(about, program.mark),
         lines=format_entries(program, imu, mapped),
-        **numbers,
+        **{of: format_entries(program, imu, mapped, of) for of in ("gyro", "accel", "both")},
         imu=imu,
         rate=format_decimal(imu.rate),
         gravity=format_decimal(STANDARD_GRAVITY),

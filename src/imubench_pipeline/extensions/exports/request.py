@@ -64,8 +64,7 @@ def load(path: Path) -> dict[str, pa.Table]:
     Raises ExportError if a table is missing, or has other columns.
     """
     try:
-        paths = find_tables(path, NEEDED)
-        return {name: read(name, [table]) for name, table in paths.items()}
+        return {name: read(name, [table]) for name, table in find_tables(path, NEEDED).items()}
     except (OSError, ValueError) as error:
         raise imu.ExportError(str(error)) from error
 
@@ -82,8 +81,7 @@ def make_content(tables: Tables, request: Request, recordings: Path | None = Non
     posterior of the fits, for an overbound. Raises ExportError if the sensor or target is not
     known, or the target does not support the estimates.
     """
-    target = find_target(request.target)
-    return target.write(build_imu(tables, request, recordings))
+    return find_target(request.target).write(build_imu(tables, request, recordings))
 
 
 def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> imu.Imu:

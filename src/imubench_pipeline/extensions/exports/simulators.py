@@ -195,8 +195,7 @@ def _map_to_filter(axes: Mapping[str, AxisNoise], imu: Imu) -> tuple[dict[str, M
                 f"deviation is within 11 % up to {longest} s"
             )
             rest = as_process(replace(model, B=0.0), horizon, rate, walk=True)
-            own = NoiseModel(N=model.N, B=model.B, K=model.K)
-            mapped[name] = Mapped(own, [words, *rest.words])
+            mapped[name] = Mapped(NoiseModel(N=model.N, B=model.B, K=model.K), [words, *rest.words])
         return mapped, f"fractalcoef({poles})"
     time = find_common_time([*models.values()], horizon, walk=True)
     mapped = {

@@ -123,10 +123,9 @@ def select(
         existing = chosen["allan"][column].unique().to_pylist()
         if asked not in existing:
             # A recording, or all recordings of a sensor, may have no curve for a reason.
-            named = _select_rows(chosen["recordings"], column, asked)
             reasons = [
                 f" with a curve; status {row.status} ({row.reason})"
-                for row in RecordingRow.rows_of(named)
+                for row in RecordingRow.rows_of(_select_rows(chosen["recordings"], column, asked))
                 if row.status != "ok" and column != "channel"
             ]
             raise CommandError(

@@ -17,6 +17,7 @@ from imubench_pipeline.extensions.figures import style
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.estimates import status_text
 
 _MOST_BANDS = 8
@@ -51,9 +52,7 @@ def draw_comparison_figure(
     the run; a marker of a simulated log is hollow.
     """
     looks = assign_sensor_styles(list(sensors))
-    groups: dict[tuple[str, bool], list[ChannelView]] = {}
-    for view in views:
-        groups.setdefault((view.sensor, view.simulated), []).append(view)
+    groups = group_rows(views, lambda view: (view.sensor, view.simulated))
     ordered = sorted(groups, key=lambda group: (sensors.index(group[0]), group[1]))
 
     unit = choose_page_unit(views[0].quantity, "adev", system)
@@ -109,10 +108,9 @@ def _draw_sensor(
         amid = math.sqrt(first * last)
         levels = [np.interp(amid, view.tau, view.adev) for view in views]
         marked = [views[int(np.argsort(levels, kind="stable")[len(levels) // 2])]]
-        curves = [np.column_stack((view.tau, view.adev * scale)) for view in views]
         axes.add_collection(
             LineCollection(
-                curves,
+                [np.column_stack((view.tau, view.adev * scale)) for view in views],
                 colors=lines["color"],
                 linestyles=lines["linestyle"],
                 linewidths=_THIN_WIDTH,
@@ -195,8 +193,7 @@ def draw_forest_figure(
         if sum(heights) <= max(_MAX_HEIGHT, _MIN_ROW_HEIGHT * len(heights)):
             break
         slot *= 0.95
-    bottoms = np.cumsum(heights)
-    rows = zip(by_sensor.items(), heights, bottoms, strict=True)
+    rows = zip(by_sensor.items(), heights, np.cumsum(heights), strict=True)
     blocks = [
         _Block(sensor, own, float(bottom - height), float(bottom))
         for (sensor, own), height, bottom in rows

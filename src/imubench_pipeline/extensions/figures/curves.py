@@ -76,15 +76,13 @@ def draw_grade_bands(axes: Axes, quantity: str, scale: float) -> None:
     edges = [np.full_like(tau, high), *edges, np.full_like(tau, low)]
     for place, name in enumerate(("consumer", *limits)):
         upper, lower = (np.clip(edge, low, high) for edge in edges[place : place + 2])
-        shade = style.GRADE_SHADES[place]
-        axes.fill_between(tau, lower, upper, color=shade, lw=0, zorder=0.0)
+        axes.fill_between(tau, lower, upper, color=style.GRADE_SHADES[place], lw=0, zorder=0.0)
         ends = [float(axes.transData.transform((tau[-1], y))[1]) for y in (lower[-1], upper[-1])]
         figure = axes.figure.get_figure(root=True)
         if (ends[1] - ends[0]) * 72.0 / figure.dpi > style.measure_text(figure, name):
-            middle = float(np.sqrt(lower[-1] * upper[-1]))
             axes.annotate(
                 name,
-                (1.0, middle),
+                (1.0, float(np.sqrt(lower[-1] * upper[-1]))),
                 xycoords=("axes fraction", "data"),
                 xytext=(3.0, 0.0),
                 textcoords="offset points",

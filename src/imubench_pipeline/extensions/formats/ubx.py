@@ -186,8 +186,7 @@ class UbxFile(LogFile):
             )
             self.note(data, wrong)
         if cut := frames.cut[kind]:
-            last = IncompleteLastRecord(self.path.name, messages=cut, message=name)
-            self.note(last, cut, "note")
+            self.note(IncompleteLastRecord(self.path.name, messages=cut, message=name), cut, "note")
 
 
 def _describe_types(columns: list[str]) -> str:

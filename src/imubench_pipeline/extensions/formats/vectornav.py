@@ -410,8 +410,7 @@ def list_sentences(path: Path, file_format: formats.FileFormat) -> list[formats.
         for place, name in enumerate(FIELDS[kind]):
             source = name if len(present) == 1 else f"{kind}.{name}"
             values = fields[place]
-            unit = UNITS.get(name)
-            columns.append(formats.LogColumn.of_numbers(source, name, values, unit))
+            columns.append(formats.LogColumn.of_numbers(source, name, values, UNITS.get(name)))
         columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
         columns += _describe_time(COUNTER, [row.counter for row in first])
         about = f"{len(rows[kind])} sentences at the beginning"

@@ -12,6 +12,7 @@ from imubench_pipeline.extensions.fusion.tables import FusionRow
 from imubench_pipeline.navigation.ratios import ComparedChannel, compute_number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.typing import Array
 
 _TAIL_PROBABILITY = 0.025  # beyond each 95 % limit
@@ -84,16 +85,13 @@ def equivalence_rows(
     """Yield rows of ``fusion``: every ordered pair of sensors at every tau, s (see `answer`)."""
     listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):
-        by_sensor: dict[str, list[ComparedChannel]] = {}
-        for channel in listed:
-            if channel.channel.startswith(quantity):
-                by_sensor.setdefault(channel.sensor, []).append(channel)
+        own = [channel for channel in listed if channel.channel.startswith(quantity)]
+        by_sensor = group_rows(own, lambda channel: channel.sensor)
         for tau in taus:
-            answers = {}
-            for name, own in by_sensor.items():
-                answers[name] = answer(
-                    name, own, tau, correlation, longest=longest, draws=draws, seed=seed
-                )
+            answers = {
+                name: answer(name, of, tau, correlation, longest=longest, draws=draws, seed=seed)
+                for name, of in by_sensor.items()
+            }
             for a, b in permutations(answers, 2):
                 row = FusionRow(quantity=quantity, tau=tau, sensor=a, other=b)
                 yield _compare_pair(row, answers[a], answers[b])

@@ -23,6 +23,7 @@ from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables.files import build, read, write_arrow
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.units import parse_quantity
 
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}  # of a printed figure
@@ -35,8 +36,7 @@ def _yield_printed(datasheet: Datasheet, channel: str) -> Iterator[tuple[str | N
         return
     names = ("noise_density", "random_walk", "bias_instability")
     figures = [figure for name in names for figure in sheet.printed(name)]
-    options = dict.fromkeys(figure.option for figure in figures) or {None: None}
-    for option in options:
+    for option in dict.fromkeys(figure.option for figure in figures) or {None: None}:
         chosen = datasheet.model_copy(update={"options": [option] if option else []})
         for one in read_comparables(chosen, channel):
             of_option = one.figure is None or one.figure.option in (None, option)
@@ -52,10 +52,7 @@ def yield_grade_rows(
     A sensor is represented by its axis of median N. `grades` has the sensors of the better class by
     their names in the catalogue.
     """
-    by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
-    for channel in candidates:
-        quantity = channel.channel.split("_")[0]
-        by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
+    by_sensor = group_rows(candidates, lambda one: (one.channel.split("_")[0], one.sensor))
     for (quantity, sensor), channels in sorted(by_sensor.items()):
         measured = [channel for channel in channels if not channel.simulated] or channels
         chosen = sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
@@ -117,9 +114,7 @@ def yield_candidates(
     recommended = parameters.filter(parameters["recommended"])
     used = [row for row in ParameterRow.rows_of(compensated) if _channel(row) in warm]
     used += [row for row in ParameterRow.rows_of(recommended) if _channel(row) not in warm]
-    groups: dict[tuple[str, str, str, str], list[ParameterRow]] = {}
-    for row in used:
-        groups.setdefault((*_channel(row), row.method), []).append(row)
+    groups = group_rows(used, lambda row: (*_channel(row), row.method))
     about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(tables["recordings"])}
     apart = list_excluded(about.values())
     read = cache(read_draws)

@@ -9,6 +9,7 @@ from imubench_pipeline.report import recording
 from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.numbers import count_digits, number_text, percent_text
 
 _PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
@@ -117,10 +118,7 @@ def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[PairLine]:
 
 def make_matrices(lines: Sequence[PairLine]) -> Iterator[PairMatrix]:
     """Yield a matrix of pair lines for each quantity and averaging time, the quietest first."""
-    groups: dict[tuple[str, str], list[PairLine]] = {}
-    for line in lines:
-        groups.setdefault((line.quantity, line.tau), []).append(line)
-    for (quantity, tau), own in groups.items():
+    for (quantity, tau), own in group_rows(lines, lambda line: (line.quantity, line.tau)).items():
         by_pair = {(line.row.sensor, line.row.other): line for line in own}
         known = [(line.row.sensor, line.row.adev) for line in own]
         known += [(line.row.other, line.row.other_adev) for line in own]
@@ -157,9 +155,7 @@ def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[GradeLine]:
 
 def find_unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
     """Return the reason for each sensor of the class that prints no figure of a quantity."""
-    groups: dict[tuple[str, str], list[GradeRow]] = {}
-    for row in rows:
-        groups.setdefault((row.quantity, row.grade_name), []).append(row)
+    groups = group_rows(rows, lambda row: (row.quantity, row.grade_name))
     return {
         f"{name}, {QUANTITY_NAMES[quantity].lower()}": own[0].reason or ""
         for (quantity, name), own in groups.items()

@@ -64,8 +64,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         if options.folder and options.project:
             raise ConfigError("found a folder and --project; expected one of the two")
-        folder = options.folder or options.project or Path()
-        night = Night(folder, options.config, options.flags)
+        night = Night(options.folder or options.project or Path(), options.config, options.flags)
         summary = night.run(options.cores, options.settle, options.wait)
     except KeyboardInterrupt:
         print("stopped by a signal before Snakemake began", file=sys.stderr)

@@ -32,6 +32,7 @@ from imubench_pipeline.extensions.papers.printed import (
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.tables.files import build, read, write_arrow
+from imubench_pipeline.tables.keys import group_rows
 
 LOGS = 100  # enough to separate ratios of 1.1 and 1.5; `benchmarks/accuracy.py` has more
 
@@ -140,8 +141,7 @@ def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
         printed_unit = line.unit.format(**fields)
         unit = paper.units.get(printed_unit, Unit(si=printed_unit))
         if line.found:
-            value = parse_number(line.found.format(**fields)) * unit.scale
-            result = replace(result, value=value)
+            result = replace(result, value=parse_number(line.found.format(**fields)) * unit.scale)
         printed = result.printed
         if line.value:
             printed = parse_number(line.value.format(**fields)) * unit.scale
@@ -176,9 +176,7 @@ def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
 
 def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
     """Write the tables ``published`` and ``accuracy`` of a run, empty without logs of a paper."""
-    parts: dict[str, list[Path]] = {}
-    for path in tables:
-        parts.setdefault(path.stem, []).append(path)
+    parts = group_rows(tables, lambda path: path.stem)
     evidence = Evidence({name: read(name, paths) for name, paths in parts.items()})
     of_maia = any(evidence.has(*log) for log in read_paper("maia").logs)
     made = {

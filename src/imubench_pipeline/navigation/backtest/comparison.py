@@ -87,8 +87,7 @@ class DeadReckoning:
 
     def sigma(self, model: NoiseModel) -> float:
         """Return the standard deviation of the error that a noise model predicts, rad, m/s or m."""
-        start = Calibrated(self.rest)
-        parts = of_sensor("gyro", model, self.order, self.time, start, self.factor)
+        parts = of_sensor("gyro", model, self.order, self.time, Calibrated(self.rest), self.factor)
         return math.hypot(*(part.sigma for part in parts))
 
 

@@ -28,8 +28,7 @@ class Turn:
     def _split(self, time: float) -> tuple[float, complex, float, float]:
         """Return the heading, its unit vector, the rate, and the time since the end of the turn."""
         turned = self.angle * min(time / self.over, 1.0)
-        unit = cmath.exp(1j * turned)
-        return turned, unit, self.angle / self.over, max(time - self.over, 0.0)
+        return turned, cmath.exp(1j * turned), self.angle / self.over, max(time - self.over, 0.0)
 
     def scale_factor(self, order: int, time: float) -> complex:
         """Return the velocity or position error from a scale factor of the upright gyro."""

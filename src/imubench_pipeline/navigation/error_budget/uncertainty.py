@@ -57,9 +57,8 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
                 for process in further
                 if process["B"] and process["T_B"]
             ]
-            amplitudes = {name: first.get(name, 0.0) for name in ("Q", "N", "B", "K", "R")}
             model = NoiseModel(
-                **amplitudes,
+                **{name: first.get(name, 0.0) for name in ("Q", "N", "B", "K", "R")},
                 T_B=first.get("T_B") or None,
                 further=processes,
                 sinusoids=_draw_lines(estimate, rng),

@@ -11,6 +11,7 @@ from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.keys import group_rows
 
 Key = tuple[str, str]  # sensor, recording
 
@@ -38,9 +39,7 @@ class Basis:
     ) -> "Basis":
         """Return the basis from the rows of a run; only recommended parameters are used."""
         about = {_make_key(row): row for row in recordings}
-        doubted: dict[Key, list[DoubtRow]] = {}
-        for doubt in doubts:
-            doubted.setdefault(_make_key(doubt), []).append(doubt)
+        doubted = group_rows(doubts, _make_key)
         channels: dict[Key, dict[str, bool]] = {}
         for row in parameters:
             if row.recommended:

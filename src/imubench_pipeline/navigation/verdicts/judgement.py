@@ -25,6 +25,7 @@ from imubench_pipeline.navigation.verdicts.standing import (
 from imubench_pipeline.noise import TERMS
 from imubench_pipeline.noise.terms.base import Role
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import pools as texts
@@ -133,9 +134,7 @@ def judge_with_corrected_units(
     factors = {key: basis.factors(key) for key in doubted}
     corrected = None
     if factors:
-        by_total: dict[tuple[str, tuple[Any, ...]], list[ErrorBudgetRow]] = {}
-        for row in own:
-            by_total.setdefault((row.recording, make_limit_key(row)), []).append(row)
+        by_total = group_rows(own, lambda row: (row.recording, make_limit_key(row)))
         in_other_unit = [
             row
             for (recording, _), parts in by_total.items()

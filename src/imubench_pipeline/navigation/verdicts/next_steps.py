@@ -19,6 +19,7 @@ from imubench_pipeline.navigation.verdicts.judgement import (
 )
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words.verdicts import next_step_text
 
 T = TypeVar("T")
@@ -48,11 +49,8 @@ class _Step:
 
 def list_next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
-    groups: dict[tuple[tuple[str, str | None], Action], list[_Step]] = {}
-    for judgement in judged:
-        if not judgement.shortfalls:
-            for step in _list_steps(judgement, basis):
-                groups.setdefault((step.key, step.action), []).append(step)
+    proposed = (step for each in judged if not each.shortfalls for step in _list_steps(each, basis))
+    groups = group_rows(proposed, lambda step: (step.key, step.action))
     rows = []
     for ((sensor, recording), action), steps in groups.items():
         turned = {step.requirement for step in steps if step.turns}
@@ -183,8 +181,7 @@ def _find_strengthening_steps(judgement: Judgement, reason: str, basis: Basis) -
             own = sensor, total.recording
             doubts = [row for row in basis.doubts.get(own, ()) if row.code == reason]
             if any(row.factor is not None for row in doubts):
-                quantities = tuple(basis.factors(own))
-                yield _Step("check_unit", own, name, False, quantities=quantities)
+                yield _Step("check_unit", own, name, False, quantities=tuple(basis.factors(own)))
             elif doubts:
                 channels = _unite(row.channel for row in doubts if row.channel)
                 mark = DoubtMark(total.recording, reason, channels)

@@ -105,8 +105,7 @@ def predict_error(
     spread = Spread(max(together.spread**2, least), len(values) - 1)
     scale = math.sqrt(spread.variance + together.error**2)
     prediction = _predict(math.log(together.value), scale, spread.freedom, limit)
-    of: SpreadOf = "specimens" if len(groups) > 1 else "recordings"
-    return Expected(*prediction, *counts, spread, of)
+    return Expected(*prediction, *counts, spread, "specimens" if len(groups) > 1 else "recordings")
 
 
 def pool_spreads(spreads: Iterable[Spread]) -> Spread | None:

@@ -165,8 +165,7 @@ class WhiteNoise(base.Term):
         self, order: int, time: float, start: SensorStart
     ) -> Iterator[tuple[SourcePath | None, float]]:
         """Yield motion and static window separately, as white noise in them is independent."""
-        moving = Uncalibrated(bias=0.0, on_time=0.0)
-        yield None, math.sqrt(self.growth(order, time, moving))
+        yield None, math.sqrt(self.growth(order, time, Uncalibrated(bias=0.0, on_time=0.0)))
         if isinstance(start, Calibrated):
             yield "static_window", self.N * math.sqrt(of_white_mean(order, time, start))
 

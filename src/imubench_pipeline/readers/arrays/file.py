@@ -118,8 +118,7 @@ class ArrayFile(LogFile):
         rows = count_block_rows(row_bytes, MAX_BLOCK_BYTES)
         read, size = 0, self.path.stat().st_size
         most = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
-        streams = [table.blocks(wanted[table], rows) for table in tables]
-        for parts in zip(*streams, strict=True):
+        for parts in zip(*[table.blocks(wanted[table], rows) for table in tables], strict=True):
             of_table = dict(zip(tables, parts, strict=True))
             block = {
                 key: of_table[table][wanted[table].index(position)]

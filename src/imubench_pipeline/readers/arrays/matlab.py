@@ -252,8 +252,7 @@ def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[table.T
         raise _make_damaged_error(f"names of fields of {width} bytes", elements.at)
     for start in range(0, len(names), width):
         field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")
-        length = elements.tag(_TYPE_MATRIX)
-        yield from _read_matrix(elements, length, f"{name}/{field}", depth + 1)
+        yield from _read_matrix(elements, elements.tag(_TYPE_MATRIX), f"{name}/{field}", depth + 1)
 
 
 class _Inflated(io.RawIOBase):

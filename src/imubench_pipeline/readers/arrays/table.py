@@ -244,8 +244,7 @@ class StreamedArray(Array):
     def _at(self, stack: ExitStack, element: int) -> IO[bytes]:
         stream = stack.enter_context(self._opened())
         # The checksum of a member of an archive requires reading from its beginning.
-        place = self._offset + element * self.dtype.itemsize
-        skip(stream, place, seek=not self._checked)
+        skip(stream, self._offset + element * self.dtype.itemsize, seek=not self._checked)
         return stream
 
 

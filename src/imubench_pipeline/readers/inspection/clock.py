@@ -63,8 +63,7 @@ def find_clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
     for place, column in enumerate(columns):
         if (names := table.file_format.time_columns) and column.label not in names:
             continue
-        is_date = column.kind == "date"
-        recognised = _recognise_date if is_date else _recognise_number
+        recognised = _recognise_date if column.kind == "date" else _recognise_number
         if (clock := recognised(column, table)) is not None:
             counts_alone = clock.counts and table.rate is None
             likely.append(replace(clock, order=(*clock.order, int(counts_alone), place)))

@@ -213,8 +213,7 @@ def _group_without_names(table: LogTable) -> list[Group]:
     for n, group in enumerate(threes):
         is_accel = n == heavy[0]
         why = "no names" if is_accel else "no names: guessed by its place"
-        quantity: Quantity = "accel" if is_accel else "gyro"
-        guessed.append(replace(group, quantity=quantity, guessed=why))
+        guessed.append(replace(group, quantity="accel" if is_accel else "gyro", guessed=why))
     return guessed
 
 

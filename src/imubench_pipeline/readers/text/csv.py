@@ -73,8 +73,7 @@ class CsvFile(LogFile):
     ) -> Iterator[Batch]:
         records = layout.records()
         rows = 0
-        parts = self._parts(layout, set(columns.values()), time, records)
-        for part in _read_ahead(parts):
+        for part in _read_ahead(self._parts(layout, set(columns.values()), time, records)):
             try:
                 stamps = None if time is None else time.seconds(part)
             except text_stamps.StampError as error:

@@ -36,8 +36,7 @@ def has_units(cells: Sequence[str]) -> bool:
     """Return whether most cells of a line are units."""
     texts = [cell.strip() for cell in cells if cell.strip()]
     units = sum(_UNIT_CELL.fullmatch(text) is not None for text in texts)
-    named = [text for text in texts if not is_missing(text)]
-    return bool(named) and 2 * units > len(texts)
+    return not all(map(is_missing, texts)) and 2 * units > len(texts)
 
 
 def complete_names(names: list[str], record: list[str]) -> list[str]:
@@ -94,8 +93,7 @@ def find_stated_rate(lines: Iterable[str]) -> float | None:
     rates = set()
     for line in lines:
         for match in _RATE_STATEMENT.finditer(line):
-            figure = float(match["figure"].replace(",", "."))
-            rates.add(figure * (1000.0 if match["kilo"] else 1.0))
+            rates.add(float(match["figure"].replace(",", ".")) * (1000.0 if match["kilo"] else 1.0))
     (rate,) = rates if len(rates) == 1 else (None,)
     return rate or None
 

@@ -81,8 +81,7 @@ class TextLayout:
         """Return the converter of lines, from the first record on, to records."""
         runs, blank = self.split.runs, self.blank_is_missing
         signs = [sign.encode() for sign in self.comments]
-        labels = self.labels
-        return complete_lines.Records(signs, self.header, self.preamble, runs, blank, labels)
+        return complete_lines.Records(signs, self.header, self.preamble, runs, blank, self.labels)
 
 
 @dataclass(frozen=True)

@@ -192,8 +192,7 @@ def check_columns(
         beyond, chance = estimate_excess_repeats(column)
         if beyond > settings.repeated and not (held or rounded):
             share = column.repeats / max(column.present - 1, 1)
-            repeated = samples.RepeatedSamples(share, chance)
-            findings.append(find(repeated, "warning", share, channel))
+            findings.append(find(samples.RepeatedSamples(share, chance), "warning", share, channel))
     findings += copies.find_repeated_stretches(usable, steps, rate)
     if static:
         findings += find_shared_noise(usable)
@@ -261,8 +260,7 @@ def _find_changes(
     # On the edge between two values of a coarse register the spread is half a step, and the mean
     # of a block moves by up to one step.
     step_size = steps.step if steps is not None and _is_rounding_dominant(steps) else 0.0
-    quantity = quantity_of(channel)
-    moved = find_motion(column, quantity, rate, settings.motion, 0.75 * step_size)
+    moved = find_motion(column, quantity_of(channel), rate, settings.motion, 0.75 * step_size)
     spans = []
     for first, last in moved:
         near = (first - step.window <= step.sample <= last + step.window for step in moves)

@@ -173,8 +173,7 @@ def find_interleaved_samples(channel: str, column: ColumnSummary) -> Iterator[Fi
     changed = [name for name, differs in changes.items() if differs]
     if len(changed) < 2 and not (changed == ["level"] and level > _MIN_LEVEL_ALTERNATION):
         return
-    data = Interleaved(tuple(changed), level, math.exp(noise))
-    yield find(data, "warning", level, channel)
+    yield find(Interleaved(tuple(changed), level, math.exp(noise)), "warning", level, channel)
 
 
 def _compare_even_and_odd(values: Array) -> tuple[float, float, int] | None:

@@ -62,5 +62,4 @@ def _fit_turn(steps: Array, middles: Array) -> Array:
     total = float(np.trace(squares))
     normal = total * np.eye(3) - squares
     seen: Array = np.linalg.pinv(normal, rcond=_MIN_OBSERVABLE_SINE_SQUARED, hermitian=True)
-    rate: Array = seen @ -np.cross(middles, steps).sum(axis=0)
-    return rate
+    return seen @ -np.cross(middles, steps).sum(axis=0)

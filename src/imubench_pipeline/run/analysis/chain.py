@@ -126,9 +126,8 @@ class Analysis:
 
     def _compare(self, sensor: str, recording: str) -> None:
         folder, plan = self._get_folder(sensor, recording), self._plan
-        stated = plan.datasheet_settings(sensor)
         tables: dict[str, Iterable[TableRow]] = {
-            **compare_with_datasheet(folder, sensor, recording, stated),
+            **compare_with_datasheet(folder, sensor, recording, plan.datasheet_settings(sensor)),
             **compute_error_tables(folder, sensor, recording, plan.error_budget_settings(sensor)),
         }
         write_each(tables, (folder / f"{name}.parquet" for name in tables))

@@ -156,8 +156,7 @@ class Results:
         for other in sorted(path.parent.glob(_SAMPLE_FILES)):
             if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
-        known_log = path.with_name(KNOWN)
-        if samples and not quality.recording.simulated and not known_log.exists():
+        if samples and not quality.recording.simulated and not path.with_name(KNOWN).exists():
             words = "expected the file identities of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 

@@ -38,8 +38,7 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     """
     weighted = _weigh_blocks(positions)
     rate = np.einsum("bij,...bj->...i", weighted, means[..., :3])
-    force = np.einsum("bij,...bj->...i", weighted, means[..., 3:])
-    return force, rate
+    return np.einsum("bij,...bj->...i", weighted, means[..., 3:]), rate
 
 
 def coarse_sigma(triad: Triad, positions: Positions, site: Site, attitude: Array) -> Array:

@@ -144,8 +144,7 @@ class MessageFile(LogFile):
         if messages.damaged:
             self.note(DamagedBytes(self.path.name, messages.damaged), messages.damaged)
         if messages.cut:
-            last = IncompleteLastRecord(self.path.name, messages=1, message="last")
-            self.note(last, 1, "note")
+            self.note(IncompleteLastRecord(self.path.name, messages=1, message="last"), 1, "note")
 
     def _find_kind(self) -> Kind:
         stated = {source.variable for source in self.sources.values()} - {None}
