@@ -20,7 +20,7 @@ from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
-from imubench_pipeline.tables.keys import split_table
+from imubench_pipeline.tables.keys import TableParts, split_table
 from imubench_pipeline.tables.schemas import BY_RECORDING
 from imubench_pipeline.typing import Array
 
@@ -140,7 +140,7 @@ class RecordingView:
     """
 
     row: RecordingRow  # of the table ``recordings``
-    parts: Mapping[str, pa.Table]  # its rows of each table
+    tables: Mapping[str, TableParts]  # tables of all recordings
     # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
     page: str = ""  # path of its page
@@ -200,35 +200,39 @@ class RecordingView:
     @property
     def budget(self) -> list[ErrorBudgetRow]:
         """Its error budget for the times in the settings, without the times of requirements."""
-        part = self.parts[ErrorBudgetRow.table]
+        part = self.part(ErrorBudgetRow.table)
         return ErrorBudgetRow.rows_of(part.filter(pc.is_null(part["requirement"])))
+
+    def part(self, table: str) -> pa.Table:
+        """Return the rows of the recording in a table."""
+        return self.tables[table].get_or_empty(self.full_name)
 
     def rows(self, of: type[R]) -> list[R]:
         """Return the rows of the recording in the table of class ``of``."""
-        part = self.parts[of.table]
+        part = self.part(of.table)
         return of.rows_of(part) if part.num_rows else []
 
     def recommended(self) -> dict[str, str]:
         """Return the recommended method of each channel."""
-        part = self.parts["parameters"]
+        part = self.part("parameters")
         chosen = part.filter(part["recommended"])
         return dict(zip(chosen["channel"].to_pylist(), chosen["method"].to_pylist(), strict=True))
 
     @property
     def rates(self) -> list[float]:
         """The sampling rate of the channel of each row of the table ``allan``, Hz."""
-        allan = self.parts["allan"]
+        allan = self.part("allan")
         return (allan["cluster_size"].to_numpy() / allan["tau"].to_numpy()).tolist()
 
     @property
     def channel_names(self) -> list[str]:
         """Names of its channels, which are read from the table ``allan``."""
-        return self.parts["allan"]["channel"].unique().to_pylist()
+        return self.part("allan")["channel"].unique().to_pylist()
 
     def channels(self) -> list[ChannelView]:
         """Return the data of its channels, made from the tables in each call."""
         channels = {}
-        for (name,), part in split_table(self.parts["allan"], "channel").items():
+        for (name,), part in split_table(self.part("allan"), "channel").items():
             named = (self.sensor, self.name, name, self.simulated)
             tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
             rate = float(part["cluster_size"][0].as_py() / tau[0])
@@ -238,17 +242,17 @@ class RecordingView:
             channel.parameters.setdefault(row.method, []).append(row)
             if row.recommended:
                 channel.recommended = row.method
-        reconstruction = split_table(self.parts["reconstruction"], "channel", "method")
+        reconstruction = split_table(self.part("reconstruction"), "channel", "method")
         for (name, method), part in reconstruction.items():
             curve = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
             channels[name].reconstruction[method] = curve
         for of in _ROWS_OF_CHANNELS:
             for one in self.rows(of):
                 getattr(channels[one.channel], of.table).append(one)
-        for (name,), part in split_table(self.parts["spectrum"], "channel").items():
+        for (name,), part in split_table(self.part("spectrum"), "channel").items():
             columns = ("frequency", "ordinates", "density", "fitted", "used")
             channels[name].spectrum = _read_floats(part, *columns)
-        for (name,), part in split_table(self.parts["allan_compensated"], "channel").items():
+        for (name,), part in split_table(self.part("allan_compensated"), "channel").items():
             channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
         for score in self.rows(estimates.ScoreRow):
             channels[score.channel].scores[score.method] = score
@@ -271,15 +275,8 @@ def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Return the data of each recording, in the order of the table ``recordings``."""
     divided = {name: split_table(tables[name], "sensor", "recording") for name in BY_RECORDING}
     keys = cache(partial(_make_keys, tables))
-    views = []
-    for row in RecordingRow.rows_of(tables["recordings"]):
-        name = (row.sensor, row.recording)
-        parts = {
-            table: by_recording[name] if name in by_recording else tables[table].slice(0, 0)
-            for table, by_recording in divided.items()
-        }
-        views.append(RecordingView(row, parts, keys))
-    return views
+    recordings = RecordingRow.rows_of(tables["recordings"])
+    return [RecordingView(row, divided, keys) for row in recordings]
 
 
 def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:

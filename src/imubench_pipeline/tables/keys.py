@@ -1,8 +1,7 @@
 """Key columns of a channel in tables, and grouping of rows by them."""
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -29,10 +28,31 @@ def group_rows(rows: Iterable[_Row], key: Callable[[_Row], _Key]) -> dict[_Key, 
     return groups
 
 
-def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
+@dataclass(frozen=True)
+class TableParts(Mapping[tuple[str, ...], pa.Table]):
+    """Parts of a table by the values of its key columns; thousands of them need little memory."""
+
+    table: pa.Table  # sorted by part
+    rows: Mapping[tuple[str, ...], tuple[int, int]]  # first row and number of rows of each part
+
+    def __getitem__(self, key: tuple[str, ...]) -> pa.Table:
+        return self.table.slice(*self.rows[key])
+
+    def get_or_empty(self, key: tuple[str, ...]) -> pa.Table:
+        """Return a part; an empty table if there is none."""
+        return self.table.slice(*self.rows.get(key, (0, 0)))
+
+    def __iter__(self) -> Iterator[tuple[str, ...]]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def split_table(table: pa.Table, *names: str) -> TableParts:
     """Return parts of a table by the values of the named columns, in order of appearance."""
     if not table.num_rows:
-        return {}
+        return TableParts(table, {})
     labels = np.zeros(table.num_rows, dtype=np.int64)
     for name in names:
         encoded = table[name].combine_chunks().dictionary_encode()
@@ -42,6 +62,7 @@ def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]
     if np.any(order[1:] < order[:-1]):
         table, labels = table.take(pa.array(order)), labels[order]
     starts = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
-    parts = [table.slice(a, b - a) for a, b in pairwise(starts.tolist())]
-    appearing = [parts[i] for i in np.argsort(order[starts[:-1]])]
-    return {tuple(part[name][0].as_py() for name in names): part for part in appearing}
+    firsts, sizes = starts[:-1], np.diff(starts)
+    keys = zip(*(table[name].take(pa.array(firsts)).to_pylist() for name in names), strict=True)
+    parts = list(zip(keys, zip(firsts.tolist(), sizes.tolist(), strict=True), strict=True))
+    return TableParts(table, dict(parts[i] for i in np.argsort(order[firsts])))

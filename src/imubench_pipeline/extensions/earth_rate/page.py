@@ -481,7 +481,7 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
     unit = choose_page_unit("gyro", "adev", site.system)
     fine = choose_page_unit("accel", "adev", "si")
     for view in site.select_compared(
-        [view for view in site.views if view.parts[AlignmentRow.table].num_rows]
+        [view for view in site.views if view.part(AlignmentRow.table).num_rows]
     ):
         rows = view.rows(AlignmentRow)
         about = rows[0]
