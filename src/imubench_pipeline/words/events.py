@@ -112,7 +112,10 @@ def events_text(
     if first.finding != "bias_step":
         where = channels_text(names)
         text = finding_text(first, system)
-        return f"{where[:1].upper()}{where[1:]}, for example: {text}" if where else text
+        if not where:
+            return text
+        begin = text[:1].lower() if text[1:2].islower() else text[:1]  # not of a symbol
+        return f"{where[:1].upper()}{where[1:]}, for example: {begin}{text[1:]}"
     starts = [row.start for row in findings if row.start is not None]
     ends = [row.end for row in findings if row.end is not None]
     when = f"{min(starts):.0f} s"
