@@ -156,9 +156,15 @@ def test_the_flicker_table_and_its_continuation_meet() -> None:
 @pytest.mark.parametrize(
     ("further", "said"),
     [
-        (GaussMarkov(-1e-5, 3.0), "bias instability B is -1e-05, expected a number from 0"),
+        (
+            GaussMarkov(-1e-5, 3.0),
+            "bias instability B is -1e-05, expected a finite number, 0 or more",
+        ),
         (GaussMarkov(1e-5, -3.0), "correlation time T_B is -3.0, expected a time above 0 s"),
-        (GaussMarkov(math.nan, 3.0), "bias instability B is nan, expected a number from 0"),
+        (
+            GaussMarkov(math.nan, 3.0),
+            "bias instability B is nan, expected a finite number, 0 or more",
+        ),
     ],
 )
 def test_a_further_term_has_values_that_a_model_can_have(further: GaussMarkov, said: str) -> None:

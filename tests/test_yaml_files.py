@@ -41,11 +41,11 @@ def bomb(levels: int, each: int) -> str:
 
 HOSTILE = {
     "an alias bomb": (bomb(10, 9), f"line 6.*more than {MAX_NODES} keys and values"),
-    "brackets": (200_000 * "[", f"more than {MAX_DEPTH} nested lists"),
-    "braces": (200_000 * "{", f"more than {MAX_DEPTH} nested lists"),
+    "brackets": (200_000 * "[", f"nested more than {MAX_DEPTH} levels deep"),
+    "braces": (200_000 * "{", f"nested more than {MAX_DEPTH} levels deep"),
     "nested maps": (
         "\n".join(" " * k + f"k{k}:" for k in range(2000)),
-        f"more than {MAX_DEPTH} nested lists",
+        f"nested more than {MAX_DEPTH} levels deep",
     ),
     "a list that contains itself": ("a: &a [1, *a]", r"line 1.*\*a contains itself"),
     "many keys": ("\n".join(f"k{k}: 1" for k in range(MAX_NODES)), f"more than {MAX_NODES} keys"),

@@ -35,7 +35,7 @@ def test_what_is_declared_in_si() -> None:
         ({"axis": {"elevation": "90 deg"}}, "axis: latitude is missing; expected the latitude"),
         ({"axis": {"latitude": "45 deg"}}, "axis.heading is missing; expected where the axis of"),
         ({"settling": "60 s"}, "step 1 lasts from 0 s to 60 s; expected more than the settling"),
-        ({"settling": "-1 s"}, "settling: found '-1 s'; expected a figure from 0"),
+        ({"settling": "-1 s"}, "settling: found '-1 s'; expected 0 or more"),
         ({"steps": STEPS[::-1]}, "step 2 starts at 280 s, before step 1 ends at 410 s"),
         ({"steps": [STEPS[0] | {"end": "0 s"}]}, "end is 0 s; expected a time after start, 0 s"),
         ({"steps": [STEPS[0] | {"rate": "5 m/s"}]}, "steps.0.rate: found '5 m/s'"),
@@ -61,7 +61,7 @@ COLUMN = {"column": 4, "unit": "deg/s"}
         ({"rate_table": {}}, "rate_table.steps: missing; expected the steady rates, such as"),
         (
             {"rate_table": {"steps": STEPS}, "log": {"table_rate": COLUMN}},
-            "rate_table.steps: found 6 of them, and the column log.table_rate; expected one",
+            "rate_table.steps: found both steps (6) and the column log.table_rate; expected one",
         ),
         (
             {"rate_table": {"steps": STEPS}, "log": {"channels": THREE}},

@@ -338,12 +338,12 @@ def test_a_counter_that_wraps(tmp_path: Path) -> None:
         (
             logged([YMR]),
             log_format(time={"column": "host_time", "unit": "s"}),
-            r"no stamp that can be read .* before the '\$', found ''",
+            r"none of the first 1 sent.* expected one before the '\$'; the first has '' before",
         ),
         (
             logged([b"noon " + YMR]),
             log_format(time={"column": "host_time", "format": "iso8601"}),
-            "found 'noon '",
+            "the first has 'noon ' before",
         ),
         (logged([YMR]), log_format(time={"column": "counter", "unit": "us"}), "'T' and a count"),
         (b"x" * 3_000_000, log_format(), "no line break in"),

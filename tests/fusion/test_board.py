@@ -86,5 +86,5 @@ def test_a_board_that_cannot_be_is_refused() -> None:
         Board([MODEL], [0.0])
     with pytest.raises(ValueError, match="not a whole multiple"):
         Board([MODEL, MODEL], [100.0, 150.0])
-    with pytest.raises(ValueError, match="expected a number per sensor"):
+    with pytest.raises(ValueError, match="expected one finite sensitivity per sensor"):
         Board([MODEL, MODEL], [1.0, 1.0], [Shared(MODEL, [1.0])])

@@ -140,7 +140,7 @@ class JointDraws:
         return len(self.first)
 
     def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
-        """Return the noise model of a draw, numbered from 0, with lines beside the noise."""
+        """Return the noise model of a draw, numbered from 0, with ``sinusoids`` added."""
         Q, N, B, T_B, K, R = self.first[number].tolist()
         time = T_B if T_B > 0.0 else None
         further = [GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0]

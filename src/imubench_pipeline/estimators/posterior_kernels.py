@@ -205,10 +205,11 @@ def fit_mixture(
     new_means: Array,
     new_scales: Array,
 ) -> int:
-    """Fill the new components from the densities at points; return how many are kept.
+    """Fit a mixture to points by expectation maximisation; return the number of components.
 
-    Components with a mass up to ``least``, or with too few effective points, are dropped. ``parts``
-    are the densities, and are overwritten; ``new_scales`` are 0 at the start.
+    One step. ``parts``: weight times density of each old component at each point, (n, c);
+    overwritten. Components with a mass up to ``least``, or with too few effective points, are
+    dropped; the others fill the start of the ``new_`` arrays. ``new_scales`` must be 0 at first.
     """
     n, d = points.shape
     near = np.empty(n)

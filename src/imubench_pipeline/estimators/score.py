@@ -55,7 +55,10 @@ def beats(one: Array, other: Array) -> float:
 
 
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
-    """Score the curves of a model, shape (m,), and its draws, (k, m), against ``measured``, SI."""
+    """Score the curves of a model, shape (m,), and of its draws, (k, m), against ``measured``.
+
+    Curves in SI. ``error``, (m,): relative standard error of ``measured``; it gives the weights.
+    """
     weight = weights(error)
     lower, upper = np.quantile(draws, [0.025, 0.975], axis=0)
     logarithm = np.log10(measured)

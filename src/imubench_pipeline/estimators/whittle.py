@@ -178,7 +178,7 @@ class Maximum:
     cost: float  # -log L, up to a constant that all models of a spectrum share
 
     def parameter(self, letter: str) -> float:
-        """Return Q, N, B of flicker noise (F) or K."""
+        """Return the value of a term by its letter: Q, N, K, or F for the B of flicker noise."""
         return float(np.sqrt(self.powers[self.terms.linear.index(letter)]))
 
     @property

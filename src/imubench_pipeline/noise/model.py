@@ -176,8 +176,8 @@ def _sum(parts: Sequence[Array], like: Array) -> Array:
 def stack_models(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Term]]:
     """Yield terms with array parameters, each with the indices of the models that have the term.
 
-    Closed forms such as `Term.growth` or `Term.allan_variance` of such a term hold for all these
-    models. A model with several terms of a kind occurs in as many stacked terms.
+    Closed forms of a stacked term, such as `Term.allan_variance`, return a value for each of its
+    models. A model with two terms of a kind is in two stacked terms of that kind.
     """
     groups: dict[tuple[type[Term], int], list[tuple[int, Term]]] = {}
     for number, model in enumerate(models):
@@ -200,9 +200,8 @@ def sum_over_stacked_terms(
 ) -> Array:
     """Return a quantity of ``number`` models that is the sum over their terms, such as a variance.
 
-    ``stacked`` is from `stack_models`; ``figure`` returns an array of shape (k,), or (places, k),
-    for a term with array parameters of shape (k,). The result has the shape (number,), or (places,
-    number).
+    ``stacked`` is from `stack_models`; ``figure`` returns an array for a term with array parameters
+    of shape (k,): (k,), or (places, k). The result has the shape (number,), or (places, number).
     """
     total = np.zeros((number,) if places is None else (places, number))
     for numbers, term in stacked:

@@ -376,7 +376,7 @@ def load_site(results: Path) -> Site:
         raise ValueError(f"{path}: is no JSON object; remove it, and run snakemake -c2") from error
     if missing:
         raise ValueError(
-            f"{path}: was made by another version of imubench_pipeline: it has no "
+            f"{path}: was made by another version of imubench_pipeline, without "
             f"{', '.join(sorted(missing))}; run snakemake -c2 again, with the same options"
         )
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))

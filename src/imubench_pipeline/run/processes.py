@@ -68,7 +68,7 @@ class Processes:
         atexit.register(self.close)
 
     def run(self, job: Job, seconds: float | None = None) -> None:
-        """Run a script; `StepError` if it fails, or runs over `seconds` (without its imports)."""
+        """Run a script; `StepError` if it fails, or lasts over `seconds` (not counting imports)."""
         ours, theirs = Pipe()
         with ours:
             with theirs:

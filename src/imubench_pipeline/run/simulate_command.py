@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=make_number_type(0, MOST_WHOLE, "a whole number from 0", int),
+        type=make_number_type(0, MOST_WHOLE, "a whole number, 0 or more", int),
         default=1,
         help="of the noise; default: 1",
     )

@@ -78,7 +78,7 @@ def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:
 
 
 def kind_of(notes: object) -> Kind:
-    """Return the kind of a recording from its notes, even if they have other errors."""
+    """Return the kind of a recording from its notes, even if the rest of them is invalid."""
     if isinstance(notes, Mapping):
         for key, block in blocks("notes").items():
             if notes.get(key) is not None and not load(block.model).is_static:

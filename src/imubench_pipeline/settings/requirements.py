@@ -121,7 +121,7 @@ _change = make_validator(
     "temperature", "a difference above zero, such as 20 K", to_si=parse_difference
 )
 
-_BIAS = "a standard deviation from 0, with its unit"
+_BIAS = "a standard deviation, 0 or more, with its unit"
 
 
 class TurnOn(Strict):

@@ -127,7 +127,7 @@ Duration = Annotated[Text, make_validator("time", "a time above 0"), Field(examp
 
 
 def _from_zero(dimension: str) -> AfterValidator:
-    return make_validator(dimension, "a figure from 0", from_zero=True)
+    return make_validator(dimension, "0 or more", from_zero=True)
 
 
 TimeFromZero = Annotated[Text, _from_zero("time"), Field(examples=["2 s"])]

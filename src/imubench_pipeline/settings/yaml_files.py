@@ -146,9 +146,8 @@ def read_yaml(path: Path) -> object:
                 open_nodes.append((event.anchor, nodes))
                 nodes += 1
                 if len(open_nodes) > MAX_DEPTH:
-                    raise _make_fault(
-                        event, f"found more than {MAX_DEPTH} nested lists and mappings; remove some"
-                    )
+                    depth = f"more than {MAX_DEPTH} levels deep; use fewer levels"
+                    raise _make_fault(event, f"lists and mappings are nested {depth}")
             elif isinstance(event, yaml.CollectionEndEvent):
                 anchor, before = open_nodes.pop()
                 if anchor is not None:

@@ -27,7 +27,8 @@ def list_files(
 ) -> Iterator[FileRow]:
     """Yield a row of the table ``files`` for each of `files`, the files in the drop zone.
 
-    These are `FoundFile` as mappings. A file whose recording has no row failed with its sensor.
+    Each is a mapping with the fields of `FoundFile`. If its recording has no row, the file has
+    failed; the reason is the reason of its sensor, if there is one.
     """
     outcome = {(row.sensor, row.recording): row for row in recordings}
     of_sensor = {row.sensor: row.reason for row in failures if row.recording is None}

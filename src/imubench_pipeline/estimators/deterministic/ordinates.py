@@ -155,7 +155,7 @@ class Ordinates:
         return noise, self.density(noise)
 
     def density(self, noise: Maximum) -> Array:
-        """Return the density of a noise model at each ordinate, shape (k,)."""
+        """Return the density of a noise model at each ordinate, SI^2/Hz, shape (k,)."""
         bins = self.whittle.spectrum.frequency
         logarithm = np.log(self.whittle.density(noise))
         return np.exp(np.interp(np.log(self.frequency), np.log(bins), logarithm))

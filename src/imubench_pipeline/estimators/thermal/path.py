@@ -301,7 +301,10 @@ class _Spline:
         return self._corrected(self._measured, self._bent, density)
 
     def draw_errors(self, density: float, errors: Array, rng: np.random.Generator) -> Array:
-        """Return errors of the path, shape (d, k), by ``errors`` of the readings and the walk."""
+        """Return draws of the error of the smoothed path, shape (d, k).
+
+        ``errors``, (d, k): drawn errors of the readings; the walk, with ``density``, is drawn here.
+        """
         normal = rng.standard_normal((len(errors), len(self._walk)))
         bent = np.sqrt(density * self._walk) * normal + self._bend(errors)
         return self._corrected(errors, bent, density)

@@ -84,7 +84,7 @@ class RateFilter:
         rate_sigma: float = UNINFORMATIVE_SIGMA,
     ) -> None:
         if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
-            raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
+            raise ValueError(f"rate_sigma is {rate_sigma}, expected a finite number, 0 or more")
         self.blocks = blocks
         states = discretise_blocks(model, blocks, turn_on_bias)
         self._filter = BlockFilter((states,), blocks.seen[:, None, None], np.array([[rate_sigma]]))

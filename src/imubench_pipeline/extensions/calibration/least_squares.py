@@ -24,6 +24,7 @@ from imubench_pipeline.extensions.calibration.experiment import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.numbers import counted
 
 _MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of a standard error by longer blocks
 _MAX_BLOCKS = 1024  # largest number of blocks in the test of a block length
@@ -116,7 +117,8 @@ class LeastSquares:
     ) -> None:
         if len(blocks) < regressors.shape[1]:
             raise NotObservableError(
-                f"{len(blocks)} means cannot determine {regressors.shape[1]} parameters"
+                f"{counted(regressors.shape[1], 'parameter')} cannot be determined from "
+                f"{counted(len(blocks), 'block mean')}; expected at least one for each parameter"
             )
         self._blocks = blocks
         covariance = block_mean_covariance(model, blocks)

@@ -36,7 +36,7 @@ class Pointing:
         for name in ("heading_sigma", "elevation_sigma"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+                raise ValueError(f"{name} is {value}, expected a finite number, 0 or more")
 
     @property
     def rate(self) -> float:

@@ -78,7 +78,7 @@ def fit_rate_table(
     deviation is negative, or the heading of an axis that is not vertical is missing.
     """
     if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
-        raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
+        raise ValueError(f"setting_sigma is {setting_sigma}, expected a finite number, 0 or more")
     rate = schedule.of_blocks(blocks) + _find_earth_rate(pointing)
     rates, levels = _group_rates(rate)
     further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)

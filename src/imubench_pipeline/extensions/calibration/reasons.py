@@ -23,8 +23,8 @@ def describe_static_noise(
 ) -> str:
     """Return a note on the static recording that a noise model comes from.
 
-    ``device``: device of the recording, if it is another specimen; ``channels``: the channel that
-    is used, and the wanted channel without an estimate, if they differ.
+    ``device``: device of the recording, if that is not the calibrated specimen. ``channels``: the
+    channel used and the channel wanted, if the wanted one has no estimate.
     """
     words = [f"static recording {recording}"]
     if device is not None:

@@ -64,7 +64,7 @@ class Schedule:
         ValueError for wrong arguments, or without a steady rate.
         """
         if not tolerance >= 0:
-            raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")
+            raise ValueError(f"tolerance is {tolerance}, expected a rate, 0 or more, in rad/s")
         if not shortest > settling >= 0:
             raise ValueError(f"shortest is {shortest} s, expected more than {settling} s settling")
         window = 2 * max(round(shortest * rate / 4.0), 1) + 1

@@ -175,8 +175,8 @@ class OnRateTable(Experiment):
             )
         if self.steps and column:
             raise ValueError(
-                f"steps: found {len(self.steps)} of them, and the column log.table_rate; expected "
-                "one of the two: leave one out"
+                f"steps: found both steps ({len(self.steps)}) and the column log.table_rate; "
+                "expected one of the two: remove steps or log.table_rate"
             )
         return stated_gyro(self.channel, channels, "is along the axis of the table")
 

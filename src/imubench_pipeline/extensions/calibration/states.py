@@ -56,7 +56,7 @@ def discretise_blocks(
     fixed bias, rad/s. Raises ValueError if the turn-on bias is negative or not finite.
     """
     if not (math.isfinite(turn_on_bias) and turn_on_bias >= 0):
-        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0")
+        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a finite number, 0 or more")
     interval = 1.0 / blocks.rate
     spaces: list[StateSpace] = []
     white = drive = 0.0

@@ -107,7 +107,7 @@ def compute_cramer_rao_bounds(
 def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the Fisher information of the rate, (rad/s)^-2, up to each block, shape (b,)."""
     if not turn_on_bias >= 0:
-        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
+        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected 0 or more, or infinity")
     white = whiten(model, blocks, np.column_stack([blocks.seen, np.ones(len(blocks))]))
     rate = np.cumsum(white[:, 0] ** 2)
     if turn_on_bias == 0:

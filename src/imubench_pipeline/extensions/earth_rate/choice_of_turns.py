@@ -393,7 +393,7 @@ def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
 
 
 def is_detection_uncertain(turns: Sequence[Event]) -> bool:
-    """Return whether further turns, of strength like the detected ones, may be undetected."""
+    """Return whether further turns, as strong as the detected ones, may be undetected."""
     usual, scatter = estimate_strength(turns)
     weak = np.mean(
         [event.kind == "transient" and event.strength < _WEAK_STRENGTH for event in turns]

@@ -189,7 +189,7 @@ def compute_allowed_sigmas(design: Experiment, model: NoiseModel) -> AllowedSigm
 
 
 def judge_error(off: float) -> str:
-    """Return whether noise explains an error, from its size in standard deviations."""
+    """Return "within the noise" or "beyond the noise" for an error in standard deviations."""
     return "within the noise" if abs(off) <= _Z_95 else "beyond the noise"
 
 

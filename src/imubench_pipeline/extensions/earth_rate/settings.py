@@ -19,7 +19,7 @@ from imubench_pipeline.settings.validation import (
 )
 from imubench_pipeline.units import parse_quantity
 
-_DriftFromZero = Annotated[Text, make_validator("gyro_ramp", "a figure from 0", from_zero=True)]
+_DriftFromZero = Annotated[Text, make_validator("gyro_ramp", "0 or more", from_zero=True)]
 _REQUIRED_KEYS = {
     "latitude": "the latitude of the place, such as latitude: 45.1 deg (south: negative)",
     "dwell": "the time from one turn to the next, such as dwell: 30 s",

@@ -285,12 +285,13 @@ class VectorNavFile(LogFile):
                 stamps, missing = self._stamps(rows)
                 if clock.first is None and missing.all():
                     at_host = self.log.time.column == HOST_TIME
-                    where = "before the '$'" if at_host else "'T' and a count at the end"
+                    where = "before the '$'" if at_host else "at the end: 'T' and a count"
                     before, body = rows[0].before[:40], rows[0].body[-40:]
                     raise RecordingError(
-                        f"{self.path.name}: no stamp that can be read in the first {len(rows)} "
-                        f"sentences; expected {where}, found {before.decode('ascii', 'replace')!r} "
-                        f"before {body.decode('ascii', 'replace')!r}; correct 'time' in the sensor "
+                        f"{self.path.name}: none of the first {len(rows)} sentences has a stamp "
+                        f"that can be read; expected one {where}; the first has "
+                        f"{before.decode('ascii', 'replace')!r} before the '$', and its fields end "
+                        f"in {body.decode('ascii', 'replace')!r}; correct 'time' in the sensor "
                         "file, or drop it and state 'rate'"
                     )
                 time = clock.seconds(stamps, ~missing)

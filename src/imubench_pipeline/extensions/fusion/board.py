@@ -70,7 +70,7 @@ class Board:
         for process in self.shared:
             sensitivity = np.asarray(process.sensitivity, dtype=np.float64)
             if sensitivity.shape != (len(self.models),) or not np.all(np.isfinite(sensitivity)):
-                raise ValueError(f"sensitivity is {sensitivity}, expected a number per sensor")
+                raise ValueError(f"found {sensitivity}, expected one finite sensitivity per sensor")
 
     @classmethod
     def alike(

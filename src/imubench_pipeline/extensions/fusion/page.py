@@ -135,7 +135,7 @@ _MAX_MATRIX_SENSORS = 40  # for which a matrix is readable
 
 
 def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[GradeLine]:
-    """Yield the lines of the table of classes: one per sensor and option with printed figures."""
+    """Yield a line per quantity, sensor, class (grade) and option with printed figures."""
     groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
         key = (row.quantity, row.sensor, row.grade, row.option or "")

@@ -35,9 +35,8 @@ class Window:
     """The parts of a window in blocks of a log."""
 
     block: float  # length of a block, s
-    # resting, moving: blocks at rest and in motion
-    resting: int
-    moving: int
+    resting: int  # number of blocks at rest
+    moving: int  # number of blocks in motion
 
     @property
     def blocks(self) -> int:
@@ -57,9 +56,9 @@ class Window:
     def weights(self, order: int) -> Array:
         """Return the weights of the block means in the error, s^(m+1), shape (blocks,); sum 0.
 
-        In motion, a weight is the integral of (t - s)^m / m! over the block. At rest, it is -c / W
-        times the length of the block, with c = t^(m+1) / (m+1)!. ``order`` is m, the number of
-        integrations minus one.
+        In motion, for a time t, a weight is the integral of (t - s)^m / m! over the block, with s
+        from the start of the motion. At rest, for a time W, it is -c / W times the length of the
+        block, with c = t^(m+1) / (m+1)!. ``order`` is m, the number of integrations minus one.
         """
         left = self.block * np.arange(self.moving, -1, -1, dtype=np.float64)
         grown = left ** (order + 1) / math.factorial(order + 1)

@@ -61,7 +61,7 @@ class TermParameter:
         time = (self.signal, self.seconds) == (0.0, 1.0)
         if math.isfinite(value) and (self.signed or value > 0.0 or (value == 0.0 and not time)):
             return
-        expected = "a finite number" if self.signed else "a number from 0"
+        expected = "a finite number" if self.signed else "a finite number, 0 or more"
         if time:
             expected = "a time above 0 s"
         raise ValueError(f"the {self.label} {self.symbol} is {value}, expected {expected}")

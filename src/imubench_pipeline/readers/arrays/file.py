@@ -97,7 +97,8 @@ class ArrayFile(LogFile):
         if len(set(lengths.values())) > 1:
             raise UnusableError(
                 f"columns of unequal length: {lengths}; expected one length: cut the longer ones, "
-                "or split them into files with 'file:'"
+                "or put columns of different length into separate files, and name the file of "
+                "each channel with 'file:' in the sensor file"
             )
         if 0 in lengths.values():
             names = join_first(table.shown for table in tables)

@@ -127,7 +127,7 @@ class CompleteLines(AbstractContextManager["CompleteLines"]):
         return False
 
     def read(self, size: int) -> bytes:
-        """Return the next complete lines, at most ``size`` bytes or one line; empty at the end."""
+        """Return complete lines, up to ``size`` bytes, or one longer line; empty at the end."""
         try:
             while not self._ready and not self._ended:
                 self._ready = self._records(self._lines(size))

@@ -246,7 +246,7 @@ _MAX_NOTES = 12
 
 
 def describe_table(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
-    """Return the only table of a text log; raise `RecordingError` if it has no records."""
+    """Return the table of a text log as a list of one; `RecordingError` if it has no records."""
     layout = find_layout(path, formats.NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
     units, units_line = find_unit_line(layout)

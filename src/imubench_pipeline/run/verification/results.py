@@ -50,7 +50,7 @@ class Results:
 
     @cached_property
     def size(self) -> int:
-        """Bytes that `faults` reads."""
+        """Number of bytes that `faults` reads."""
         samples = self.folder.glob(f"recordings/*/*/{_SAMPLE_FILES}")
         return sum(file.size for file in self._left.values()) + sum(
             path.stat().st_size for path in samples if path.is_file()

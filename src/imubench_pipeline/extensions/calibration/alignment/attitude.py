@@ -63,7 +63,10 @@ def rotation(vector: ArrayLike) -> Array:
 
 
 def euler_jacobian(attitude: Array) -> Array:
-    """Return d(roll, pitch, heading)/d(psi), shape (3, 3); ValueError if the pitch is +-pi/2."""
+    """Return d(roll, pitch, heading)/d(psi), shape (3, 3); ValueError if the pitch is +-pi/2.
+
+    ``psi``: small error angles of the attitude about the navigation axes, rad (see the module).
+    """
     _, pitch, heading = euler_angles(attitude)
     cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)
     if cp < MIN_COS_PITCH:

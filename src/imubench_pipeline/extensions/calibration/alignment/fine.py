@@ -46,7 +46,10 @@ class Aligned:
 
 
 class FineAlignment:
-    """A filter that aligns runs with equal blocks, linear about an attitude, shape (3, 3)."""
+    """A filter that aligns runs with the same blocks, linearised about an attitude.
+
+    ``attitude``: body to navigation frame in the first position, shape (3, 3).
+    """
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
         self.positions, self.site, self.attitude = positions, site, attitude

@@ -57,7 +57,7 @@ class Triad:
         for name in ("gyro_bias", "accelerometer_bias"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+                raise ValueError(f"{name} is {value}, expected a finite number, 0 or more")
 
     @property
     def axes(self) -> list[tuple[NoiseModel, float]]:
