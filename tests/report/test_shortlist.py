@@ -52,7 +52,7 @@ def test_all_sensors_have_their_margins_and_sources(read: dict[str, Read]) -> No
     for text in (
         *("meets if …", "0.25", "1.23", "simulated logs", HOSTILE),
         "its gyro scale factor error is below 1200 ppm (1σ; met by 3 of 20 datasheets ",
-        "unknown figures (assumed worst) 90 %, noise 10 %",
+        "90 % unknown figures (assumed worst), 10 % noise",
         "gyro scale factor (assumed worst value) 90 %",
     ):
         assert text in line.text

@@ -15,7 +15,8 @@ from tests.report.tables import ROBOT
 
 NAMES = {name: name.upper() for name in "abc"}
 LIMIT = (
-    "Deciding limit: heading, 100 s. Expected error (1σ) 0.29 ° (0.23 to 0.34), allowed 0.573 °."
+    "Deciding limit: heading, 100 s. Expected error (1σ) 0.29 ° (0.23 to 0.34); "
+    "the limit allows 0.573 ° (1σ)."
 )
 DATA = "Data: one recording, r (2 h, 1 axis); other specimens may differ."
 

@@ -41,7 +41,7 @@ def test_the_command_prints_the_verdicts(folder: Path, capsys: pytest.CaptureFix
     printed = capsys.readouterr().out
     assert "A robot" in printed and "not enough data" in printed
     assert (
-        "one: its datasheet does not print all noise parameters: a log is needed; unknown"
+        "one: its datasheet does not print all noise parameters: a log is needed; 100 % unknown"
         in printed
     )
     assert "by logs" not in printed

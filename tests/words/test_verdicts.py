@@ -207,7 +207,7 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
     assert origins_text(shares) == (
-        "unknown figures (assumed worst) 60 %, noise 35 %, datasheet figures except noise 5 %"
+        "60 % unknown figures (assumed worst), 35 % noise, 5 % datasheet figures except noise"
     )
 
 

@@ -89,7 +89,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
 def _describe_verdict(row: RankingRow) -> str:
     if row.verdict == "excluded":
         return verdicts.SHORT_VERDICTS[row.verdict]
-    margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
+    margins = [f"margin in use {number_text(row.margin, 3)}" if row.margin is not None else ""]
     margins.append(verdicts.other_margins_text(row))
     return ", ".join(filter(None, [verdicts.SHORT_VERDICTS[row.verdict], *margins]))
 

@@ -43,7 +43,9 @@ def make_methods_table(
         for symbol in symbols:
             rows = channel.true_components.get(symbol, [])
             term = "GM" * (len(rows) > 1)
-            parts = [_part(r.value, None, None, "assumed" * r.assumed, term) for r in rows]
+            parts = [
+                _part(r.value, None, None, "assumed, not published" * r.assumed, term) for r in rows
+            ]
             source = rows[0].source if rows else "Not simulated."
             cells.append(_cell(parts, source, count_digits(None, None, None, symbol)))
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})

@@ -385,9 +385,9 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
         decides = next(limit for limit in group.limits if limit.decides)
         differ = len(set(decides.interval.split(" to "))) > 1  # as printed
         interval = Markup(" ({})").format(decides.interval) if differ else ""
-        text = Markup("Deciding limit: {}. Expected error (1σ) {}{}, allowed {}.").format(
-            decides.limit, decides.sigma, interval, decides.allowed
-        )
+        text = Markup(
+            "Deciding limit: {}. Expected error (1σ) {}{}; the limit allows {} (1σ)."
+        ).format(decides.limit, decides.sigma, interval, decides.allowed)
         if decides.reason:
             text += f" The error may be larger: {decides.reason}."
         yield text + f" {_describe_data(site, group.row)}"  # still markup

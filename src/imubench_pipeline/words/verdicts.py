@@ -244,7 +244,7 @@ def share_text(share: verdicts.Share) -> str:
 
 
 def origins_text(shares: Iterable[verdicts.Share]) -> str:
-    """Return the parts of the variance by origin: ``noise 40 %, datasheet 10 %``."""
+    """Return the parts of the variance by origin: ``40 % noise, 10 % rest``."""
     parts: dict[str, float] = {}
     for share in shares:
         noise = share.is_noise and share.origin != "class limit"
@@ -254,7 +254,7 @@ def origins_text(shares: Iterable[verdicts.Share]) -> str:
     shown = [(name, round(100.0 * part)) for name, part in largest_first if part >= 0.005]
     if shown and (rest := 100 - sum(percent for _, percent in shown)) > 0:
         shown.append(("rest", rest))
-    return ", ".join(f"{name} {percent} %" for name, percent in shown)
+    return ", ".join(f"{percent} % {name}" for name, percent in shown)
 
 
 _ORIGINS_OF_FIGURES: Mapping[Origin, str] = {

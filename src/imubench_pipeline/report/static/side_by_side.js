@@ -295,7 +295,7 @@ async function addOwnVerdicts(table, text) {
   });
   const cells = chosen.map((one) => {
     const { verdict, margin, noise } = judged[one.row.sensor] ?? { verdict: "not_enough_data", margin: null };
-    const margins = margin === null ? "" : `, margin ${numberText(margin, 3)}, noise alone ${numberText(noise, 2)}`;
+    const margins = margin === null ? "" : `, margin in use ${numberText(margin, 3)}, noise-only margin ${numberText(noise, 2)}`;
     return element("td", {}, `${pageData.verdicts[verdict]}${margins}`);
   });
   table.tBodies[0].append(element("tr", { className: "own" }, element("th", { scope: "row" }, `Yours: ${limits.join(", ")}`), ...cells));
