@@ -45,7 +45,7 @@ gc.set_threshold(100_000, 20, 100)
 atexit.register(gc.freeze)
 
 # Incomplete files are left by killed runs. At the beginning of a run these are the files that are too
-# old to be those of another command; at the end, the files that were not written since the beginning.
+# old to be of another command; at the end, the files that were not written since the beginning.
 BEGUN = time.time()
 
 HERE = workflow.current_basedir

@@ -41,7 +41,7 @@ class Failure:
 
     @property
     def name(self) -> str:
-        """``sensor/recording``, or the sensor alone for a step of the whole sensor."""
+        """``sensor/recording``, or only the sensor for a step of the whole sensor."""
         return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
 
     def row(self) -> FailureRow:

@@ -70,7 +70,7 @@ class Courses:
 
 
 def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return sigma of the rate by white noise alone, N / sqrt(T) / cos(latitude), rad/s.
+    """Return sigma of the rate from white noise only, N / sqrt(T) / cos(latitude), rad/s.
 
     T is the total time in blocks, s.
     """

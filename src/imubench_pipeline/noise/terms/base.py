@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Role(Enum):
-    """Kind of noise by which filters and simulators represent a term; most know few kinds."""
+    """Kind of noise with which filters and simulators represent a term; most know few kinds."""
 
     WHITE = "white noise"
     RANDOM_WALK = "a random walk"

@@ -23,7 +23,7 @@ _MIN_CYCLES = 1.5  # in a log, of a drift that is called periodic
 
 
 def removal_text(factors: Mapping[str, float] | None) -> str:
-    """Return by which ``factors`` parameters would be larger if a signal were not removed."""
+    """Return how much larger parameters would be, by ``factors``, if a signal were not removed."""
     if factors is None:
         return ""
     clear = {name: factor for name, factor in factors.items() if name in _SHOWN}

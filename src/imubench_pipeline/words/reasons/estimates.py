@@ -90,7 +90,7 @@ def lag_range(lower: float, upper: float) -> str:
 
 
 def temperature_like_ramp(share: float) -> str:
-    """Return why temperature is not separable from time; ``share``: explained by time alone."""
+    """Return why temperature is not separable from time; ``share``: explained by time only."""
     return (
         f"the temperature is close to a ramp: time alone explains {percent_text(share, 2)} of the "
         "information on the sensitivity. Vary the temperature up and down"
