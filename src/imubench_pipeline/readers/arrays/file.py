@@ -143,7 +143,7 @@ class ArrayFile(LogFile):
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
         if len(tables) > MAX_ARRAYS:
-            raise UnusableError(f"more than {MAX_ARRAYS} arrays; save the arrays of one sensor only")
+            raise UnusableError(f"more than {MAX_ARRAYS} arrays; save only arrays of one sensor")
         for table in tables:
             if table.name in by_name:
                 raise UnusableError(f"{table.shown} occurs twice; expected one array of that name")
