@@ -180,7 +180,7 @@ def growing(notes: Path) -> None:
     [
         (pipe, "error", "not a regular file"),
         (lost, "unavailable", "no such file"),
-        (deep, "error", "line 1: not readable as YAML: found more than"),
+        (deep, "error", "line 1: not readable as YAML: lists and mappings are nested more than"),
         (twice, "error", "line 2: not readable as YAML: the key 'device' occurs twice"),
         (growing, "error", "line 6: not readable as YAML: found more than"),
     ],

@@ -68,7 +68,7 @@ def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
     (robot,) = page["requirements"]
     assert robot == {
         "title": "a robot",
-        "sensors": {"one": "meets if …, margin 0.25, likely margin 0.9"},
+        "sensors": {"one": "meets if …, margin in use 0.25, likely margin 0.9"},
     }
 
 

@@ -288,7 +288,10 @@ def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
         plain = table
         for place, name in enumerate(table.column_names):
             column = table[place]
-            if pa.types.is_list(column.type):
+            if pa.types.is_list(column.type) and pa.types.is_string(column.type.value_type):
+                joined = pc.binary_join(column, "\x1f").dictionary_encode()
+                plain = plain.set_column(place, name, joined)
+            elif pa.types.is_list(column.type):
                 texts = [str(value) for value in column.to_pylist()]
                 plain = plain.set_column(place, name, pa.array(texts, pa.string()))
             elif pa.types.is_primitive(column.type):
