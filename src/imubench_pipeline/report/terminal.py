@@ -21,6 +21,7 @@ from imubench_pipeline.report import run_summary
 from imubench_pipeline.report.comparison import select_symbols
 from imubench_pipeline.report.meaning import Group, format_rankings
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
+from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.keys import group_rows
 from imubench_pipeline.words import numbers
@@ -176,7 +177,7 @@ def describe_length(
 def explain_no_estimates(row: RecordingRow) -> Text:
     """Return why an analysed log has no parameters."""
     why = "noise is not estimated for a turned sensor"
-    why = "no channel can be analysed" if row.kind == "static" else why
+    why = "no channel can be analysed" if row.kind == AT_REST else why
     return Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
 
 
