@@ -214,7 +214,7 @@ def until_there(process: subprocess.Popen[bytes], path: Path, words: int = 0) ->
 
 
 @pytest.mark.release
-@pytest.mark.skipif(sys.platform != "linux", reason="a fork learns of it on Linux alone")
+@pytest.mark.skipif(sys.platform != "linux", reason="only on Linux, a fork learns of it")
 def test_scripts_end_at_once_with_the_run_that_started_them(tmp_path: Path) -> None:
     put(tmp_path, "wait", WAIT)
     put(tmp_path, "imports_long", IMPORTS_LONG)
@@ -232,7 +232,7 @@ def test_scripts_end_at_once_with_the_run_that_started_them(tmp_path: Path) -> N
     assert not (tmp_path / "ran").exists()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the system ends a fork on Linux alone")
+@pytest.mark.skipif(sys.platform != "linux", reason="only on Linux, the system ends a fork")
 def test_a_script_that_runs_past_its_time_is_ended(steps: Processes, tmp_path: Path) -> None:
     put(tmp_path, "wait", WAIT)
     with pytest.raises(StepError, match=r"^wait.py ran for longer than 0.5 s$") as caught:
@@ -294,7 +294,7 @@ def test_what_a_script_prints_goes_to_its_log(
 
 # The last one here: after it another server would have to begin.
 @pytest.mark.release
-@pytest.mark.skipif(not Path("/proc/self/comm").is_file(), reason="names are set on Linux alone")
+@pytest.mark.skipif(not Path("/proc/self/comm").is_file(), reason="names are set only on Linux")
 def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_it(
     steps: Processes, tmp_path: Path
 ) -> None:

@@ -58,7 +58,7 @@ def slurm() -> Iterator[dict[str, str]]:
         said = f"not installed: {', '.join(missing)}"
         if os.environ.get("CI") == "true":
             pytest.fail(said)
-        pytest.skip(said)  # on a machine of one's own alone: CI fails above
+        pytest.skip(said)  # only on a developer's machine: CI fails above
     # Not in pytest's folder, which is closed to others: munge refuses to put its socket there.
     folder = Path(tempfile.mkdtemp(prefix="imubench.slurm."))
     try:

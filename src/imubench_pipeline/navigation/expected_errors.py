@@ -258,7 +258,7 @@ def list_error_rows(
             totals = np.array([question.answer(*axes_drawn).total for axes_drawn in each])
         else:
             assert gyro is not None  # every error needs one
-            totals = _add_figures(variances(question, gyro, accel), question, pair, many)
+            totals = _compute_drawn_totals(variances(question, gyro, accel), question, pair, many)
         asked = replace(asked, gyro=gyro, accel=accel)
         lower, upper = uncertainty.compute_limits(totals, nominal.total, _TAIL)
         used = [channel for channel in chosen.values() if channel]
@@ -308,7 +308,7 @@ def _draw_variances(
     """Return a function for the variance of an error from noise, for each drawn model of a channel.
 
     Its arguments are a question, other than ``north``, and the channels of the gyro and of the
-    accelerometer; the result has the shape (draws,).
+    accelerometer; the result is in rad^2, (m/s)^2 or m^2, shape (draws,).
     """
 
     @cache
@@ -329,7 +329,8 @@ def _draw_variances(
         total = factor**2 * grown(gyro, GYRO_ORDER[error], time, start.gyro)
         if error in ACCEL_ORDER and accel:
             total = total + grown(accel, ACCEL_ORDER[error], time, start.accel)
-        if error == "attitude" and accel and isinstance(start.accel, Calibrated):
+        levelled = error == "attitude" and start.tilt is None
+        if levelled and accel and isinstance(start.accel, Calibrated):
             window = start.accel.window
             at_rest = grown(accel, 0, window, Uncalibrated(bias=0.0, on_time=0.0))
             total = total + at_rest / (window * STANDARD_GRAVITY) ** 2
@@ -338,15 +339,16 @@ def _draw_variances(
     return variance
 
 
-def _add_figures(
+def _compute_drawn_totals(
     variance: Array,
     question: Question,
     pair: Sequence[AxisErrors],
     drawn: Sequence[Sequence[AxisErrors]],
 ) -> Array:
-    """Return the totals of an error with a variance from noise and drawn figures, shape (draws,).
+    """Return the totals, rad, m/s or m, of an error for each draw, shape (draws,).
 
-    ``pair`` and ``drawn`` are the sources, and draws of them, of the gyro and the accelerometer.
+    ``variance`` is from noise, shape (draws,). ``pair`` has the sources of the gyro and of the
+    accelerometer, ``drawn`` draws of both; the noise models in them are not used.
     """
     gyro, accel = (
         AxisErrors(
@@ -371,12 +373,12 @@ def _add_figures(
             variance = variance + (part.sigma * size) ** 2
         else:
             vectors.append(part.vector * size)
-    both = sum((np.abs(vector) ** 2 for vector in vectors), np.zeros(1))
+    planar = sum((np.abs(vector) ** 2 for vector in vectors), np.zeros(1))
     confidence = question.confidence_in_plane
     if confidence is None:
-        return np.sqrt(variance + both)
+        return np.sqrt(variance + planar)
     factor = compute_radius_factor(variance, vectors, confidence)
-    return factor * np.sqrt(2.0 * variance + both)
+    return factor * np.sqrt(2.0 * variance + planar)
 
 
 def find_largest_figures(

@@ -25,7 +25,7 @@ def browser() -> Iterator[Browser]:
         said = "no Chromium: not on the path, and not in PLAYWRIGHT_CHROMIUM"
         if os.environ.get("CI"):
             pytest.fail(said)
-        pytest.skip(said)  # on a machine of one's own alone: CI fails above
+        pytest.skip(said)  # only on a developer's machine: CI fails above
     # As root, Chromium does not start in its sandbox.
     arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
     with sync_playwright() as driver:
